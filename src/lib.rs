@@ -1,3 +1,21 @@
 #![doc = include_str!("../README.md")]
 
+pub mod audio;
+pub mod bundle;
+pub mod config;
+pub mod engine;
 pub mod error;
+pub mod export;
+pub mod flow;
+pub mod frame;
+#[allow(unsafe_code, reason = "SIMD loads, stores and inline assembly")]
+pub mod kernels;
+pub mod metrics;
+pub mod nn;
+#[allow(unsafe_code, reason = "the fork-join pool hands slices to its worker")]
+pub mod par;
+pub mod pose;
+pub mod recording;
+pub mod session;
+pub mod user;
+pub mod vae;

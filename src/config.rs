@@ -1,0 +1,139 @@
+//! The bundle's configuration: everything about sizes, rates and the rig that weights alone do not say.
+//!
+//! Stored as JSON under the key `visavis` of the safetensors metadata; written by `training/visavis_train/export.py`.
+
+use crate::pose::Rig;
+use serde::{Deserialize, Serialize};
+
+/// The format version that this build reads and writes.
+pub const FORMAT: u32 = 1;
+
+/// Configuration of a bundle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Config {
+    /// Format version, [`FORMAT`].
+    pub format: u32,
+    /// Name of the model.
+    pub name: String,
+    /// One or two sentences: what it was trained on and for.
+    pub description: String,
+    /// Licence statement of the weights, with the acknowledgements that their data asks for.
+    pub licence: String,
+    /// Blocks by which the user's voice and position lag the block they steer (1: up to the end of the block before).
+    pub user_delay_blocks: u32,
+    /// Blocks by which the agent's own voice lags (0: known ahead, as from text-to-speech).
+    pub agent_delay_blocks: u32,
+    /// The skeleton.
+    pub rig: Rig,
+    /// Pose representation.
+    pub pose: PoseConfig,
+    /// Audio encoder.
+    pub audio: AudioConfig,
+    /// Variational autoencoder of motion.
+    pub vae: VaeConfig,
+    /// Flow transformer.
+    pub flow: FlowConfig,
+    /// Single-step student, when the bundle holds one.
+    pub student: Option<StudentConfig>,
+    /// Defaults for sessions.
+    pub session: SessionConfig,
+}
+
+/// Pose representation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PoseConfig {
+    /// Circumradius of the icosahedra, metres.
+    pub radius: f32,
+}
+
+/// Audio encoder: a stack of causal convolutions over 24 kHz mono, one feature vector a frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AudioConfig {
+    /// Convolutions, first to last; the product of their strides is 800.
+    pub layers: Vec<ConvConfig>,
+    /// Width of the feature vector.
+    pub features: usize,
+}
+
+/// One causal convolution: `kernel - stride` zeros (or carried samples) on the left, then GELU.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ConvConfig {
+    /// Input channels.
+    pub inputs: usize,
+    /// Output channels.
+    pub outputs: usize,
+    /// Kernel length, at least `stride`.
+    pub kernel: usize,
+    /// Stride.
+    pub stride: usize,
+    /// Adds the input to the output; needs stride 1 and `inputs == outputs`.
+    pub residual: bool,
+}
+
+/// Variational autoencoder of motion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct VaeConfig {
+    /// Transformer layers of the encoder and of the decoder, each.
+    pub layers: usize,
+    /// Width.
+    pub width: usize,
+    /// Attention heads.
+    pub heads: usize,
+    /// Width of the feed-forward layer over `width`.
+    pub mlp: usize,
+    /// Width of a latent, `D_z`.
+    pub latent: usize,
+    /// Sliding window, blocks, the current one included.
+    pub window_blocks: usize,
+}
+
+/// Flow transformer.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FlowConfig {
+    /// Transformer layers.
+    pub layers: usize,
+    /// Width.
+    pub width: usize,
+    /// Attention heads.
+    pub heads: usize,
+    /// Width of the feed-forward layer over `width`.
+    pub mlp: usize,
+    /// Width of the flow-time embedding.
+    pub tau_width: usize,
+    /// Sliding window, blocks, the current one included.
+    pub window_blocks: usize,
+    /// Width of the embedding of the noisy latent.
+    pub embed_latent: usize,
+    /// Width of the embedding of the user's position.
+    pub embed_user: usize,
+    /// Width of the embedding of each voice.
+    pub embed_voice: usize,
+    /// Width of the embedding of the gaze score.
+    pub embed_gaze: usize,
+    /// User positions are divided by this before they are embedded, metres.
+    pub user_scale: f32,
+}
+
+/// Single-step student.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct StudentConfig {
+    /// Flow time at which the student sees its (clean) history.
+    pub tau_history: f32,
+    /// Guidance weight that was distilled in.
+    pub guidance: f32,
+    /// Gaze guidance weight that was distilled in.
+    pub gaze_guidance: f32,
+}
+
+/// Defaults for sessions.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SessionConfig {
+    /// Guidance weight.
+    pub guidance: f32,
+    /// Gaze guidance weight.
+    pub gaze_guidance: f32,
+    /// Blocks between re-anchorings; 0 never.
+    pub anchor_period: u32,
+    /// Distance from the anchor at which the session re-anchors early, metres.
+    pub anchor_radius: f32,
+}
