@@ -3,7 +3,6 @@
 use super::condition::Condition;
 use super::history::History;
 use super::network::FlowNet;
-use super::noise::normal;
 use super::slots::{Branches, CHUNK, GAZE, NO_GAZE, Slots, UNCONDITIONAL};
 use crate::frame::Sampler;
 use crate::kernels::{Exec, KvDtype};
@@ -110,10 +109,11 @@ impl Generator {
         self.reference.cache_bytes() + self.student.as_ref().map_or(0, Slots::cache_bytes)
     }
 
-    /// Appends a known latent (standardised) without sampling, for the start of a session.
-    pub fn append(&mut self, seed: u64, condition: &Condition, z: &[f32]) {
+    /// Appends a known latent (standardised) without sampling, for the start of a session. `noise` fills the token's
+    /// noise, given its index.
+    pub fn append(&mut self, condition: &Condition, z: &[f32], noise: impl FnOnce(u64, &mut [f32])) {
         let token = self.history.len();
-        normal(seed, token, self.history.begin(condition));
+        noise(token, self.history.begin(condition));
         self.history.finish(z);
     }
 
