@@ -102,12 +102,12 @@ impl Decoder {
         for (joint, r) in self.joints.iter_mut().zip(&self.rotations) {
             joint.rotation = Quat::from_mat3(&Mat3::from_cols_array(r).transpose()).normalize();
         }
-        self.to_world(frame);
+        self.place(frame);
         self.fit.fit(&self.joints, &self.root, frame);
         Ok(())
     }
 
-    fn to_world(&mut self, frame: &mut Frame) {
+    fn place(&mut self, frame: &mut Frame) {
         let heading = self.root.rotation();
         frame.root = self.root;
         frame.global.resize(self.joints.len(), Transform::IDENTITY);

@@ -62,7 +62,7 @@ impl Body {
             "chest" => self.slab(SHIRT, j, to * 0.6, 0.07, 0.11),
             "upperChest" => self.slab(SHIRT, j, to * 0.4, 0.085, 0.105),
             "Shoulder" => self.cone(SHIRT, j, Vec3::NEG_Y * 0.01, to, [0.06, 0.06], Vec3::ONE),
-            "neck" => self.cone(SKIN, j, to * -0.3, to, [0.055, 0.05], Vec3::ONE),
+            "neck" => self.cone(SKIN, j, to * -0.3, to, [0.052, 0.05], Vec3::ONE),
             "head" => self.head(rig, j, to),
             "UpperArm" => self.cone(SHIRT, j, Vec3::ZERO, to, [0.058, 0.042], Vec3::ONE),
             "LowerArm" => self.cone(SKIN, j, Vec3::ZERO, to, [0.042, 0.030], Vec3::ONE),
@@ -84,14 +84,14 @@ impl Body {
     /// A piece of the trunk: wide, not deep, around `at` in the frame of joint `j`.
     fn slab(&mut self, part: usize, j: usize, at: Vec3, half_width: f32, radius: f32) {
         let wide = Vec3::X * half_width * self.scale;
-        self.cone(part, j, at - wide, at + wide, [radius; 2], Vec3::new(1.0, 1.0, 0.85));
+        self.cone(part, j, at - wide, at + wide, [radius; 2], Vec3::new(1.0, 1.45, 0.85));
     }
 
     /// Skull, nose and eyes, so that one sees where the head faces.
     fn head(&mut self, rig: &Rig, j: usize, crown: Vec3) {
         let eyes = Vec3::from(rig.eyes);
-        let middle = crown * 0.52;
-        let ball = Vec3::new(0.80, 1.05, 1.0);
+        let middle = crown.with_y(eyes.y);
+        let ball = Vec3::new(0.80, 1.08, 1.0);
         self.cone(SKIN, j, middle, middle, [0.105 / self.scale; 2], ball * (crown.y / 0.18));
         let unit = crown.y / 0.18;
         for side in [-1.0, 1.0] {
