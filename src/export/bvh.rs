@@ -25,8 +25,8 @@ const SCALE: f64 = 100.0;
 /// Joint positions are those of [`crate::frame::Frame::hips`] and [`crate::frame::Frame::local`] to 0.01 mm.
 ///
 /// # Errors
-/// [`crate::ErrorKind::Argument`] if the recording has no frames, or frames that do not fit its rig or are not finite;
-/// [`crate::ErrorKind::BundleInvalid`] if the rig does not pass [`Rig::check`]; [`crate::ErrorKind::Io`] if the file cannot be
+/// [`crate::error::ErrorKind::Argument`] if the recording has no frames, or frames that do not fit its rig or are not finite;
+/// [`crate::error::ErrorKind::BundleInvalid`] if the rig does not pass [`Rig::check`]; [`crate::error::ErrorKind::Io`] if the file cannot be
 /// written. All name `path`.
 pub fn write_bvh(recording: &Recording, path: impl AsRef<Path>) -> Result<()> {
     let path = path.as_ref();
