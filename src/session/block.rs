@@ -135,7 +135,15 @@ impl BlockState {
 
         engine.latent.restore(&mut self.latent);
         engine.decoder.step(&mut self.exec, &mut self.decoder, &self.latent, &mut self.features);
-        self.anchor.step(&mut self.exec, engine, &mut self.generator, &mut self.decoder, &self.latent, &mut self.features, &root);
+        self.anchor.step(
+            &mut self.exec,
+            engine,
+            &mut self.generator,
+            &mut self.decoder,
+            &self.latent,
+            &mut self.features,
+            &root,
+        );
         tell(&mut probe, block, "decoded", &self.features);
 
         engine.pose.restore(&mut self.features);

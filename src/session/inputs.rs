@@ -193,7 +193,11 @@ impl Inputs {
     }
 
     pub(super) fn stats(&self) -> InputStats {
-        InputStats { agent_voice: self.agent.voice.stats(), user_voice: self.user.voice.stats(), head: self.track.stats() }
+        InputStats {
+            agent_voice: self.agent.voice.stats(),
+            user_voice: self.user.voice.stats(),
+            head: self.track.stats(),
+        }
     }
 
     pub(super) fn delays(&self, config: &Config) -> Delays {
