@@ -119,6 +119,7 @@ def main():
     parser.add_argument("--frames", type=int, default=60)
     parser.add_argument("--features", type=int, default=64)
     parser.add_argument("--lr", type=float, default=2e-3)
+    parser.add_argument("--init", help="checkpoint to start from")
     parser.add_argument("--threads", type=int, default=1)
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
@@ -133,15 +134,17 @@ def main():
     check = held.batch(64)
     check_targets = targets(check)
     net, head = AudioEncoder(features=args.features), nn.Linear(args.features, 2 * BANDS + 4)
+    if args.init:
+        net.load_state_dict(torch.load(args.init, weights_only=False)["net"])
     both = nn.ModuleList([net, head])
-    optim, log, clock = common.Optimiser(both, args.lr), common.Log(args.out + ".jsonl"), common.Clock(args.minutes)
+    optim, log, clock = common.optimiser(both, args.lr), common.Log(args.out + ".jsonl"), common.Clock(args.minutes)
     step = 0
     while clock.progress < 1:
         wave = train.batch(args.batch)
         with torch.autocast("cpu", torch.bfloat16):
             features = net(wave)
         loss = (head(features.float()) - targets(wave)).square().mean()
-        optim.set_rate(common.rate(args.lr, step, clock.progress, 100))
+        common.set_rate(optim, common.rate(args.lr, step, clock.progress, 100))
         optim.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(both.parameters(), 1.0)

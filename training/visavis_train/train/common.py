@@ -41,37 +41,16 @@ def rate(peak, step, progress, warmup=200, floor=0.02):
     return peak * min(1.0, (step + 1) / warmup) * (floor + (1 - floor) * 0.5 * (1 + math.cos(math.pi * progress)))
 
 
-class Optimiser:
-    """AdamW, and with `muon` Muon (orthogonalised momentum, Jordan 2024) for the matrices inside transformer layers."""
+def optimiser(net, lr, decay=1e-2):
+    """AdamW; matrices decay, vectors do not."""
+    every = [p for p in net.parameters() if p.requires_grad]
+    groups = [{"params": [p for p in every if p.dim() > 1], "weight_decay": decay}, {"params": [p for p in every if p.dim() <= 1], "weight_decay": 0.0}]
+    return torch.optim.AdamW(groups, lr=lr, betas=(0.9, 0.99))
 
-    def __init__(self, net, lr, decay=1e-2, muon=False):
-        inner = {id(p) for name, p in net.named_parameters() if muon and ".layers." in "." + name and p.dim() == 2 and ".mod." not in name}
-        every = [p for p in net.parameters() if p.requires_grad]
-        rest = [p for p in every if id(p) not in inner]
-        groups = [{"params": [p for p in rest if p.dim() > 1], "weight_decay": decay}, {"params": [p for p in rest if p.dim() <= 1], "weight_decay": 0.0}]
-        self.parts = [torch.optim.AdamW(groups, lr=lr, betas=(0.9, 0.99))]
-        if muon:
-            self.parts.append(torch.optim.Muon([p for p in every if id(p) in inner], lr=lr, weight_decay=decay, adjust_lr_fn="match_rms_adamw"))
 
-    def zero_grad(self):
-        for o in self.parts:
-            o.zero_grad()
-
-    def step(self):
-        for o in self.parts:
-            o.step()
-
-    def set_rate(self, lr):
-        for o in self.parts:
-            for group in o.param_groups:
-                group["lr"] = lr
-
-    def state_dict(self):
-        return [o.state_dict() for o in self.parts]
-
-    def load_state_dict(self, state):
-        for o, s in zip(self.parts, state):
-            o.load_state_dict(s)
+def set_rate(optim, lr):
+    for group in optim.param_groups:
+        group["lr"] = lr
 
 
 def save(path, **state):

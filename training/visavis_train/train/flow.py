@@ -103,7 +103,6 @@ def main():
     parser.add_argument("--apart", type=float, default=0.35, help="share of time on the regime with history and current apart")
     parser.add_argument("--slip", type=float, default=0.15)
     parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--adamw", action="store_true", help="AdamW for every parameter, no Muon")
     parser.add_argument("--resume", action="store_true")
     parser.add_argument("--end-to-end", metavar="AUDIO", help="audio checkpoint to train along; needs --init and a cache with voices")
     parser.add_argument("--init", help="flow checkpoint whose weights to start from")
@@ -121,7 +120,7 @@ def main():
     latent, width_a = train.items[0]["z"][0].shape[-1], train.items[0]["agent"].shape[-1]
     net = FlowNet(latent, width_a, **size)
     parts = nn.ModuleList([net] + ([audio] if audio else []))
-    optim, clock, step = common.Optimiser(parts, args.lr, muon=not args.adamw), common.Clock(args.minutes), 0
+    optim, clock, step = common.optimiser(parts, args.lr), common.Clock(args.minutes), 0
     if state:
         net.load_state_dict(state["net"])
     ema = common.Ema(net, 0.999)
@@ -146,7 +145,7 @@ def main():
         apart = torch.rand(1).item() < share
         z, cond = train.batch(args.batch)
         loss = (apart_loss if apart else shared_loss)(net, z, cond, metric, args.slip)
-        optim.set_rate(common.rate(args.lr, step, clock.progress))
+        common.set_rate(optim, common.rate(args.lr, step, clock.progress))
         optim.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(parts.parameters(), 1.0)

@@ -96,7 +96,6 @@ def main():
     parser.add_argument("--lr", type=float, default=1.5e-3)
     parser.add_argument("--kl", type=float, default=2e-5)
     parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--adamw", action="store_true", help="AdamW for every parameter, no Muon")
     parser.add_argument("--limit", type=int, help="take at most this many clips")
     parser.add_argument("--init", help="checkpoint whose weights to start from (schedule starts anew)")
     parser.add_argument("--resume", action="store_true")
@@ -123,7 +122,7 @@ def main():
     else:
         start_from_principal(net, (every - mean) / std, weights)
         del every
-    optim, ema = common.Optimiser(net, args.lr, muon=not args.adamw), common.Ema(net, 0.998)
+    optim, ema = common.optimiser(net, args.lr), common.Ema(net, 0.998)
     clock, step = common.Clock(args.minutes), 0
     if state:
         optim.load_state_dict(state["optim"])
@@ -140,7 +139,7 @@ def main():
             y, mu, logvar = net(x)
         parts = losses(x, y, mean, std, mu, logvar, weights, jw)
         loss = sum(v for k, v in parts.items() if k != "kl") + args.kl * parts["kl"]
-        optim.set_rate(common.rate(args.lr, step, clock.progress))
+        common.set_rate(optim, common.rate(args.lr, step, clock.progress))
         optim.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(net.parameters(), 1.0)
