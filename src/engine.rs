@@ -151,6 +151,11 @@ impl Engine {
         self.flow.bytes_per_pass()
     }
 
+    /// Blocks of the idle clip, which are the first tokens of every session.
+    pub fn idle_blocks(&self) -> usize {
+        self.idle.len() / self.latent.mean.len()
+    }
+
     /// Width of a pose feature vector.
     pub(crate) fn features(&self) -> usize {
         self.pose.mean.len()
