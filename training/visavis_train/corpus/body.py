@@ -148,7 +148,8 @@ def _arms(rng, g, hips, yaw, feet, arms, spd, breath):
         g[:, INDEX[shoulder]] = chest @ rig.axis_mat("z", sg * gaussian(lift, 1))
         # elbow: behind a hanging arm, turned with the arm by the shortest rotation, then out by the swivel angle
         zero = np.zeros(frames)
-        back = np.stack([np.sin(arms.swivel[s]), zero, -np.cos(arms.swivel[s])], 1)
+        out = arms.swivel[s] + 0.7 * np.clip((0.05 - wrist[:, 0]) / 0.15, 0, 1)   # across the body: elbow clear of the trunk
+        back = np.stack([np.sin(out), zero, -np.cos(out)], 1)
         down = np.stack([zero, zero - 1, zero], 1)
         pole = np.einsum("tab,tb->ta", rig.between(down, rig.unit(wrist)), back)
         up, lo, n = two_bone(np.zeros((frames, 3)), wrist * sign, pole * sign, UPPER, FORE)

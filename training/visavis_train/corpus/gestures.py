@@ -70,8 +70,8 @@ def _draw_spot(rng, spots, size):
 def limit(p):
     """Keeps wrists [..., 3] within reach and in front of the trunk."""
     p = np.array(p, float)
-    p[..., 2] = np.maximum(p[..., 2], np.where(p[..., 0] < 0.02, 0.19, 0.04))
     p[..., 0] = np.maximum(p[..., 0], -0.15)
+    p[..., 2] = np.maximum(p[..., 2], 0.03 + 0.16 * np.clip((0.08 - p[..., 0]) / 0.11, 0, 1) * np.clip((p[..., 1] + 0.49) / 0.06, 0, 1))
     p[..., 1] = np.minimum(p[..., 1], 0.02 + 0.12 * np.tanh(np.maximum(p[..., 1], 0.0)))
     r = np.linalg.norm(p, axis=-1, keepdims=True)
     return p * np.minimum(1.0, 0.505 / np.maximum(r, 1e-6)) * np.maximum(1.0, 0.20 / np.maximum(r, 1e-6))

@@ -15,12 +15,22 @@ SIGNALS = {"train": ["basketball_signal_1", "basketball_signal_2", "basketball_s
 WALK_TEST, WALK_VAL, WALK_SKIP = {"16", "49"}, {"12", "32"}, {"03"}
 # Dips to the floor, frames of the files at 60 Hz (README of the data)
 LEAVE_OUT = {"60_01": [(701, 914)], "60_02": [(1294, 1383)], "60_11": [(1691, 1745)], "61_11": [(1678, 1757)]}
-SPEED_LIMIT = 9.0  # m/s of any joint; frames above it are capture errors and split a take
+SPEED_LIMIT, ACCEL_LIMIT = 9.0, 170.0  # m/s, m/s2 of any joint; frames above are capture errors and split a take
 
 
 def walk_split(name):
     subject = name.split("_")[0]
     return "test" if subject in WALK_TEST else "val" if subject in WALK_VAL else "train"
+
+
+def capture_errors(positions):
+    """Frames [T] bool around which a joint moves faster than people do."""
+    v = np.linalg.norm(np.diff(positions, axis=0), axis=-1).max(1) * FPS
+    a = np.linalg.norm(np.diff(positions, 2, axis=0), axis=-1).max(1) * FPS ** 2
+    bad = np.zeros(len(positions), bool)
+    for i in np.concatenate([np.flatnonzero(v > SPEED_LIMIT), np.flatnonzero(a > ACCEL_LIMIT)]):
+        bad[max(0, i - 1): i + 3] = True
+    return bad
 
 
 def signal_takes(data, split, skeleton):
@@ -44,9 +54,7 @@ def two_person(data, split, least=6.0):
         for t in takes:
             for a, b in LEAVE_OUT.get(t.name, []):
                 bad[a // 2 - 3: b // 2 + 3] = True
-            v = np.linalg.norm(np.diff(t.positions[:n], axis=0), axis=-1).max(1) * FPS
-            for i in np.flatnonzero(v > SPEED_LIMIT):
-                bad[max(0, i - 1): i + 3] = True
+            bad |= capture_errors(t.positions[:n])
         heads = [t.positions[:, rig.INDEX["head"]] + t.rotations[:, rig.INDEX["head"]] @ rig.EYES for t in takes]
         for a, b in _pieces(bad, int(least * FPS)):
             for k in (0, 1):
@@ -71,7 +79,7 @@ def walk_takes(data, split):
         if not f.endswith(".bvh") or walk_split(name) != split or name.split("_")[0] in WALK_SKIP:
             continue
         take = load_take(os.path.join(folder, f), name)
-        bad = np.concatenate([[False], np.linalg.norm(np.diff(take.positions, axis=0), axis=-1).max(1) * FPS > SPEED_LIMIT])
+        bad = capture_errors(take.positions)
         for a, b in _pieces(bad, 45):
             out.append((f"{name}_{a}", take.positions[a:b], take.rotations[a:b]))
             out.append((f"{name}_{a}_mirror", *rig.mirror(take.positions[a:b], take.rotations[a:b])))
