@@ -14,6 +14,7 @@ mod bvh;
 mod gltf;
 #[cfg(test)]
 mod scratch;
+pub mod viewer;
 mod vrma;
 
 pub use atomic::write_atomically;
