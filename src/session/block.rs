@@ -54,7 +54,7 @@ impl BlockState {
             generator,
             decoder: engine.decoder.state(options.cache),
             anchor: Anchor::new(engine, options),
-            motion: pose::Decoder::new(&engine.config.rig, engine.config.pose.radius),
+            motion: pose::Decoder::new(engine.kernels, &engine.config.rig, engine.config.pose.radius),
             head: engine.config.rig.index("head").unwrap_or(0),
             noise: Noise::Seeded,
             latent: vec![0.0; engine.config.vae.latent],
