@@ -14,6 +14,12 @@ mod avx2;
 mod avx512;
 #[cfg(target_arch = "x86_64")]
 mod avxvnni;
+#[cfg(target_arch = "aarch64")]
+pub(crate) mod dotprod;
+#[cfg(target_arch = "aarch64")]
+mod i8mm;
+#[cfg(target_arch = "aarch64")]
+mod neon;
 mod scalar;
 
 /// Order of the bytes of 16 outputs x 4 or 8 columns in packed weights, as a variant wants them.
@@ -116,6 +122,16 @@ pub(crate) static VARIANTS: &[Variant<Kernel>] = &[
         level: Level::Avx512,
         run: Kernel { run: avx512::run, layout: Layout::QuadsOffset, wide: false },
     },
+    #[cfg(target_arch = "aarch64")]
+    Variant { name: "neon", level: Level::Neon, run: Kernel { run: neon::run, layout: Layout::Quads, wide: false } },
+    #[cfg(target_arch = "aarch64")]
+    Variant {
+        name: "dotprod",
+        level: Level::Dotprod,
+        run: Kernel { run: dotprod::run, layout: Layout::Quads, wide: false },
+    },
+    #[cfg(target_arch = "aarch64")]
+    Variant { name: "i8mm", level: Level::I8mm, run: Kernel { run: i8mm::run, layout: Layout::Octets, wide: false } },
 ];
 
 #[cfg(test)]
