@@ -104,3 +104,17 @@ impl FloatGeometry {
         (row / NR) * self.panel + s * self.seg_stride + k * NR + row % NR
     }
 }
+
+/// Evaluates `$e` with the constant `$R` the number of rows, 1 to 16.
+macro_rules! for_rows {
+    ($rows:expr, $R:ident => $e:expr) => {
+        for_rows!(@ $rows, $R, $e, 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16)
+    };
+    (@ $rows:expr, $R:ident, $e:expr, $($n:literal)*) => {
+        match $rows {
+            $($n => { const $R: usize = $n; $e })*
+            _ => unreachable!("rows were checked"),
+        }
+    };
+}
+pub(crate) use for_rows;

@@ -8,11 +8,11 @@ use super::packed::{FloatGeometry, Tile};
 use super::{Level, Variant};
 
 #[cfg(target_arch = "x86_64")]
-mod avx2;
+pub(crate) mod avx2;
 #[cfg(target_arch = "x86_64")]
-mod avx512;
+pub(crate) mod avx512;
 #[cfg(target_arch = "aarch64")]
-mod neon;
+pub(crate) mod neon;
 mod scalar;
 
 pub(crate) use scalar::body;

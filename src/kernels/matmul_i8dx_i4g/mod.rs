@@ -12,6 +12,16 @@ use super::packed::{NR, Tile};
 use super::quantize_rows::GROUP;
 use super::{Level, Variant};
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+#[cfg(target_arch = "x86_64")]
+mod avxvnni;
+#[cfg(target_arch = "aarch64")]
+mod dotprod;
+#[cfg(target_arch = "aarch64")]
+mod neon;
 mod scalar;
 
 /// Where an int4 weight and its scale lie.
@@ -73,7 +83,19 @@ impl Job<'_> {
 /// A variant's entry; unsafe to call on a CPU without its level.
 pub(crate) type Run = unsafe fn(&Job<'_>, &mut Tile<f32>);
 
-pub(crate) static VARIANTS: &[Variant<Run>] = &[Variant { name: "scalar", level: Level::Scalar, run: scalar::run }];
+pub(crate) static VARIANTS: &[Variant<Run>] = &[
+    Variant { name: "scalar", level: Level::Scalar, run: scalar::run },
+    #[cfg(target_arch = "x86_64")]
+    Variant { name: "avx2", level: Level::Avx2, run: avx2::run },
+    #[cfg(target_arch = "x86_64")]
+    Variant { name: "avxvnni", level: Level::AvxVnni, run: avxvnni::run },
+    #[cfg(target_arch = "x86_64")]
+    Variant { name: "avx512_vnni", level: Level::Avx512, run: avx512::run },
+    #[cfg(target_arch = "aarch64")]
+    Variant { name: "neon", level: Level::Neon, run: neon::run },
+    #[cfg(target_arch = "aarch64")]
+    Variant { name: "dotprod", level: Level::Dotprod, run: dotprod::run },
+];
 
 #[cfg(test)]
 mod tests;

@@ -8,6 +8,18 @@ use super::packed::{NR, Tile};
 use super::quantize_rows::GROUP;
 use super::{Level, Variant};
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+#[cfg(target_arch = "x86_64")]
+mod avxvnni;
+#[cfg(target_arch = "aarch64")]
+pub(crate) mod dotprod;
+#[cfg(target_arch = "aarch64")]
+mod i8mm;
+#[cfg(target_arch = "aarch64")]
+mod neon;
 mod scalar;
 
 /// Order of the bytes of 16 outputs x 4 or 8 columns in packed weights, as a variant wants them.
@@ -86,11 +98,41 @@ pub(crate) struct Kernel {
     pub(crate) wide: bool,
 }
 
-pub(crate) static VARIANTS: &[Variant<Kernel>] = &[Variant {
-    name: "scalar",
-    level: Level::Scalar,
-    run: Kernel { run: scalar::run, layout: Layout::Quads, wide: false },
-}];
+pub(crate) static VARIANTS: &[Variant<Kernel>] = &[
+    Variant {
+        name: "scalar",
+        level: Level::Scalar,
+        run: Kernel { run: scalar::run, layout: Layout::Quads, wide: false },
+    },
+    #[cfg(target_arch = "x86_64")]
+    Variant {
+        name: "avx2",
+        level: Level::Avx2,
+        run: Kernel { run: avx2::run, layout: Layout::QuadsPaired, wide: true },
+    },
+    #[cfg(target_arch = "x86_64")]
+    Variant {
+        name: "avxvnni",
+        level: Level::AvxVnni,
+        run: Kernel { run: avxvnni::run, layout: Layout::QuadsOffset, wide: false },
+    },
+    #[cfg(target_arch = "x86_64")]
+    Variant {
+        name: "avx512_vnni",
+        level: Level::Avx512,
+        run: Kernel { run: avx512::run, layout: Layout::QuadsOffset, wide: false },
+    },
+    #[cfg(target_arch = "aarch64")]
+    Variant { name: "neon", level: Level::Neon, run: Kernel { run: neon::run, layout: Layout::Quads, wide: false } },
+    #[cfg(target_arch = "aarch64")]
+    Variant {
+        name: "dotprod",
+        level: Level::Dotprod,
+        run: Kernel { run: dotprod::run, layout: Layout::Quads, wide: false },
+    },
+    #[cfg(target_arch = "aarch64")]
+    Variant { name: "i8mm", level: Level::I8mm, run: Kernel { run: i8mm::run, layout: Layout::Octets, wide: false } },
+];
 
 #[cfg(test)]
 mod tests;
