@@ -60,7 +60,7 @@ impl Body {
             "hips" => self.slab(TROUSERS, j, Vec3::NEG_Y * 0.02 * self.scale, 0.075, 0.105),
             "spine" => self.slab(SHIRT, j, to * 0.5, 0.055, 0.105),
             "chest" => self.slab(SHIRT, j, to * 0.6, 0.07, 0.11),
-            "upperChest" => self.slab(SHIRT, j, to * 0.4, 0.085, 0.105),
+            "upperChest" => self.slab(SHIRT, j, to * 0.02, 0.085, 0.105),
             "Shoulder" => self.cone(SHIRT, j, Vec3::NEG_Y * 0.01, to, [0.06, 0.06], Vec3::ONE),
             "neck" => self.cone(SKIN, j, to * -0.3, to, [0.052, 0.05], Vec3::ONE),
             "head" => self.head(rig, j, to),
