@@ -141,6 +141,9 @@ def test_store_round_trip_and_errors(tmp_path, clip):
     assert c.positions.dtype == np.float32 and check.bone_error(c.positions.astype(float)) < 1e-4
     assert np.abs(c.positions[0, 0, [0, 2]]).max() < 1e-5
     assert abs(rig.yaw_of(rig.quat_to_mat(c.rotations[:1, 0]))[0]) < 1e-5
+    first = open(path, "rb").read()
+    store.save(path, clip.positions, clip.rotations, clip.user, voice, None, {"sources": ["x"], "split": "train"})
+    assert open(path, "rb").read() == first
     g0 = rig.gaze_score(clip.positions, clip.rotations, clip.user)
     assert np.allclose(rig.gaze_score(c.positions, rig.quat_to_mat(c.rotations), c.user_head), g0, atol=1e-4)
     store.save(path, clip.positions, clip.rotations, clip.user, voice[:-1], None, {})

@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from safetensors import safe_open
-from safetensors.numpy import save_file
 
 from ..motion import rig
 
@@ -53,7 +52,22 @@ def save(path, positions, rotmats, user, agent_voice, user_voice, meta):
             data[key] = _pcm(voice)
     meta = {k: v if isinstance(v, str) else json.dumps(v) for k, v in meta.items()}
     meta.setdefault("fps", str(rig.FPS))
-    save_file({k: np.ascontiguousarray(v) for k, v in data.items()}, path, metadata=meta)
+    _write(path, data, meta)
+
+
+def _write(path, tensors, meta):
+    """safetensors by hand: the library's writer orders metadata at random, and equal clips should be equal files."""
+    header, at = {"__metadata__": dict(sorted(meta.items()))}, 0
+    for k in sorted(tensors):
+        v = tensors[k]
+        header[k] = {"dtype": {"float32": "F32", "int16": "I16"}[v.dtype.name], "shape": list(v.shape), "data_offsets": [at, at + v.nbytes]}
+        at += v.nbytes
+    text = json.dumps(header, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 8)
+    with open(path, "wb") as f:
+        f.write(len(text).to_bytes(8, "little") + text)
+        for k in sorted(tensors):
+            f.write(np.ascontiguousarray(tensors[k]).astype(tensors[k].dtype.newbyteorder("<"), copy=False).tobytes())
 
 
 def load(path):
