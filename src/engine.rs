@@ -1,7 +1,7 @@
 //! The engine: a loaded bundle, immutable, shared by any number of sessions.
 
-use crate::audio::AudioWeights;
-use crate::bundle::{BundleFile, Tensors};
+use crate::audio::{AudioEncoder, AudioWeights};
+use crate::bundle::{AudioSource, BundleFile, Tensors};
 use crate::config::Config;
 use crate::error::{Error, ErrorKind, Result};
 use crate::flow::{ConditionLayout, FlowNet};
@@ -34,6 +34,8 @@ pub struct Engine {
     pub(crate) config: Config,
     pub(crate) kernels: Kernels,
     pub(crate) audio: AudioWeights,
+    #[cfg(feature = "tract")]
+    pub(crate) audio_source: AudioSource,
     pub(crate) encoder: Encoder,
     pub(crate) decoder: Decoder,
     pub(crate) flow: FlowNet,
@@ -89,8 +91,9 @@ impl Engine {
             return Err(Error::new(ErrorKind::BundleInvalid, message));
         }
         let net = |prefix| FlowNet::load(t, kernels, &config.flow, latent, layout, prefix);
+        let audio_source = AudioSource::load(t, &config.audio)?;
         let mut engine = Self {
-            audio: AudioWeights::load(t, kernels, &config.audio)?,
+            audio: audio_source.pack(kernels, &config.audio)?,
             encoder: Encoder::load(t, kernels, &config.vae, features)?,
             decoder: Decoder::load(t, kernels, &config.vae, features)?,
             flow: net("flow")?,
@@ -98,6 +101,8 @@ impl Engine {
             pose: Standard::load(t, "stats.pose", features)?,
             latent: Standard::load(t, "stats.latent", latent)?,
             idle: Vec::new(),
+            #[cfg(feature = "tract")]
+            audio_source,
             kernels,
             config,
         };
@@ -164,11 +169,11 @@ impl Engine {
     /// An executor with scratch for the widest operation of any of the networks.
     pub(crate) fn exec(&self, threads: usize) -> Result<Exec> {
         let c = &self.config;
-        let conv = c.audio.layers.iter().map(|l| l.kernel * l.inputs);
+        let (rows, audio) = AudioEncoder::limits(&c.audio);
         let flow = [c.flow.width * c.flow.mlp.max(6), c.flow.embed_user + 2 * c.flow.embed_voice + c.flow.embed_gaze + 4];
         let rest = [c.vae.width * c.vae.mlp.max(3), self.features(), 4 * c.audio.features, c.vae.latent, c.flow.tau_width];
-        let width = conv.chain(flow).chain(rest).max().unwrap_or(1);
-        Exec::new(self.kernels, threads, Limits { rows: 32, width })
+        let width = flow.into_iter().chain(rest).fold(audio, usize::max);
+        Exec::new(self.kernels, threads, Limits { rows: rows.max(32), width })
     }
 }
 

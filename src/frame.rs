@@ -142,7 +142,8 @@ impl std::str::FromStr for Sampler {
     /// Reads `midpoint4`, `midpoint2`, `midpoint1`, `euler:N` (1 to 64) or `single`.
     fn from_str(s: &str) -> Result<Self> {
         let wrong = || {
-            let message = format!("unknown sampler {s:?}: midpoint4, midpoint2, midpoint1, euler:N (N 1 to 64) or single");
+            let message =
+                format!("unknown sampler {s:?}: midpoint4, midpoint2, midpoint1, euler:N (N 1 to 64) or single");
             Error::new(ErrorKind::Argument, message)
         };
         match s {

@@ -79,7 +79,12 @@ fn chunking_and_interleaving_do_not_change_a_bit() {
         assert_eq!(frames.len(), whole.len());
         for (a, b) in frames.iter().zip(&whole) {
             // The gaze of a frame is measured against the head as known by then; it does not steer.
-            assert_eq!((a.root, &a.global, &a.local), (b.root, &b.global, &b.local), "chunks of {piece}, frame {}", a.index);
+            assert_eq!(
+                (a.root, &a.global, &a.local),
+                (b.root, &b.global, &b.local),
+                "chunks of {piece}, frame {}",
+                a.index
+            );
         }
     }
 }

@@ -1,9 +1,9 @@
 //! Ranges of a config. They bound what an engine allocates before any tensor has been looked at.
 
 use super::file::invalid;
+use crate::audio::check_audio_config;
 use crate::config::Config;
 use crate::error::Result;
-use crate::frame::FRAME_SAMPLES;
 
 /// Checks every number of `config` against its range.
 pub(super) fn config(c: &Config) -> Result<()> {
@@ -13,24 +13,7 @@ pub(super) fn config(c: &Config) -> Result<()> {
     real("pose.radius", c.pose.radius, 0.001, 10.0)?;
 
     within("audio.layers", c.audio.layers.len(), 1, 32)?;
-    within("audio.features", c.audio.features, 1, 4096)?;
-    let (mut channels, mut stride) = (1, 1);
-    for (i, layer) in c.audio.layers.iter().enumerate() {
-        within(&format!("audio.layers[{i}].outputs"), layer.outputs, 1, 4096)?;
-        within(&format!("audio.layers[{i}].stride"), layer.stride, 1, FRAME_SAMPLES)?;
-        within(&format!("audio.layers[{i}].kernel"), layer.kernel, layer.stride, 4096)?;
-        if layer.inputs != channels {
-            return Err(invalid(format!("audio.layers[{i}] takes {} channels, but gets {channels}", layer.inputs)));
-        }
-        if layer.residual && (layer.stride != 1 || layer.inputs != layer.outputs) {
-            return Err(invalid(format!("audio.layers[{i}] is residual, which needs stride 1 and equal channels")));
-        }
-        channels = layer.outputs;
-        stride = (stride * layer.stride).min(1 << 20);
-    }
-    if stride != FRAME_SAMPLES {
-        return Err(invalid(format!("the strides of audio.layers multiply to {stride}, expected {FRAME_SAMPLES}")));
-    }
+    check_audio_config(&c.audio)?;
 
     let v = &c.vae;
     within("vae.layers", v.layers, 1, 64)?;

@@ -77,7 +77,12 @@ impl fmt::Display for Contents {
             writeln!(f, "  {title:<20} {:>8} {elements:>12} {bytes:>12}  {}", part.len(), dtypes.join(", "))?;
         }
         let stack: Vec<_> = c.audio.layers.iter().map(|l| format!("{}/{}", l.outputs, l.stride)).collect();
-        writeln!(f, "\n  audio    24 kHz, convolutions (channels/stride) {}, {} features", stack.join(" "), c.audio.features)?;
+        writeln!(
+            f,
+            "\n  audio    24 kHz, convolutions (channels/stride) {}, {} features",
+            stack.join(" "),
+            c.audio.features
+        )?;
         let v = &c.vae;
         writeln!(
             f,

@@ -3,11 +3,13 @@
 //! Opening a bundle checks everything before any of it is used: the container, the config's ranges, each tensor's name,
 //! dtype and shape, and that every number is finite. Sizes are bounded by the file's own before memory is taken.
 
+mod audio;
 mod check;
 mod contents;
 mod file;
 mod tensors;
 
+pub use audio::AudioSource;
 pub use contents::{Contents, TensorInfo};
 pub use file::BundleFile;
 pub use tensors::Tensors;

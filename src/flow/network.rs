@@ -78,7 +78,9 @@ impl FlowNet {
         let tau = TauWeights {
             first: linear("tau.0", c.tau_width, c.tau_width)?,
             second: linear("tau.2", c.tau_width, c.tau_width)?,
-            layers: (0..c.layers).map(|i| linear(&format!("layers.{i}.mod"), 6 * d, c.tau_width)).collect::<Result<_>>()?,
+            layers: (0..c.layers)
+                .map(|i| linear(&format!("layers.{i}.mod"), 6 * d, c.tau_width))
+                .collect::<Result<_>>()?,
             last: linear("final.mod", 2 * d, c.tau_width)?,
         };
 

@@ -198,10 +198,11 @@ impl Slots {
                 self.rows.push(self.ring(slot, branch), token, first);
                 self.mod_index.push((2 * slot + usize::from(is_new)) as u32);
                 net.rope.fill(&mut self.phases, row, token);
+                let projected = &self.projected[self.projected_at(token, d)..][..2 * d];
                 let conditioning = match (self.branches, branch) {
                     (Branches::Guided, UNCONDITIONAL) => net.unconditional(),
-                    (Branches::Guided, NO_GAZE) => self.projected(token, 0, d),
-                    _ => self.projected(token, 1, d),
+                    (Branches::Guided, NO_GAZE) => &projected[..d],
+                    _ => &projected[d..],
                 };
                 let z_in = &self.z_in[(token - tokens.start) as usize * d..][..d];
                 let x = &mut self.x[row * d..][..d];
@@ -259,14 +260,13 @@ impl Slots {
         if token < self.projected_end && token + self.projected_capacity > self.projected_end {
             return;
         }
-        let d2 = 2 * net.config().width;
-        let at = (token % self.projected_capacity) as usize * d2;
-        net.project(exec, history.condition(token), &mut self.embedded, &mut self.projected[at..][..d2]);
+        let (d, at) = (net.config().width, self.projected_at(token, net.config().width));
+        net.project(exec, history.condition(token), &mut self.embedded, &mut self.projected[at..][..2 * d]);
         self.projected_end = token + 1;
     }
 
-    fn projected(&self, token: u64, which: usize, d: usize) -> &[f32] {
-        &self.projected[((token % self.projected_capacity) as usize * 2 + which) * d..][..d]
+    fn projected_at(&self, token: u64, d: usize) -> usize {
+        (token % self.projected_capacity) as usize * 2 * d
     }
 
     fn ring(&self, slot: usize, branch: usize) -> usize {

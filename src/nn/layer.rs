@@ -129,7 +129,8 @@ impl Layer {
 
         exec.norm(x, n, d, norms.norm1.0, norms.norm1.1, normed);
         exec.linear(&self.qkv, normed, n, qkv, Epilogue::Store);
-        exec.rope(qkv, n, 3 * d, 2 * heads, d / heads, &phases.cos, &phases.sin);
+        let half = n * d / heads / 2;
+        exec.rope(qkv, n, 3 * d, 2 * heads, d / heads, &phases.cos[..half], &phases.sin[..half]);
         for ((span, position), row) in rows.spans.iter().zip(&rows.positions).zip(qkv.chunks_exact(3 * d)) {
             cache.write(span.ring as usize, *position, &row[d..2 * d], &row[2 * d..]);
         }

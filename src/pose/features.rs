@@ -1,10 +1,10 @@
 //! Feature vectors to world transforms and back.
 
 use super::icosahedron::{decode, encode};
-use super::polar::Scalar;
 use super::{Fit, Rig};
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{Frame, JOINT_CHANNELS, ROOT_CHANNELS, Root, Transform};
+use crate::kernels::Kernels;
 use glam::{Mat3, Quat, Vec3};
 
 /// Length F of the feature vector of `joints` joints: `3 + 36 joints`.
@@ -34,7 +34,7 @@ pub struct Decoder {
     radius: f32,
     root: Root,
     fit: Fit,
-    kernels: Scalar,
+    kernels: Kernels,
     /// Joints in the heading frame.
     joints: Vec<Transform>,
     maps: Vec<[f32; 9]>,
@@ -45,13 +45,13 @@ pub struct Decoder {
 
 impl Decoder {
     /// A decoder for `rig` and icosahedra of circumradius `radius` (metres), with the root at the origin facing +Z.
-    pub fn new(rig: &Rig, radius: f32) -> Self {
+    pub fn new(kernels: Kernels, rig: &Rig, radius: f32) -> Self {
         let n = rig.len();
         Self {
             radius,
             root: Root::default(),
-            fit: Fit::new(rig),
-            kernels: Scalar,
+            fit: Fit::new(kernels, rig),
+            kernels,
             joints: vec![Transform::IDENTITY; n],
             maps: vec![[0.0; 9]; n],
             rotations: vec![[0.0; 9]; n],
@@ -102,12 +102,12 @@ impl Decoder {
         for (joint, r) in self.joints.iter_mut().zip(&self.rotations) {
             joint.rotation = Quat::from_mat3(&Mat3::from_cols_array(r).transpose()).normalize();
         }
-        self.to_world(frame);
+        self.place(frame);
         self.fit.fit(&self.joints, &self.root, frame);
         Ok(())
     }
 
-    fn to_world(&mut self, frame: &mut Frame) {
+    fn place(&mut self, frame: &mut Frame) {
         let heading = self.root.rotation();
         frame.root = self.root;
         frame.global.resize(self.joints.len(), Transform::IDENTITY);
@@ -187,7 +187,7 @@ mod tests {
     #[test]
     fn transforms_survive_the_round_trip() {
         let recording = synthetic::walk(300);
-        let mut decoder = Decoder::new(&recording.rig, RADIUS);
+        let mut decoder = Decoder::new(Kernels::detect().unwrap(), &recording.rig, RADIUS);
         decoder.reset(recording.frames[0].root);
         let mut out = Frame::empty(recording.rig.len());
         for (x, frame) in features(&recording.frames).iter().zip(&recording.frames) {
@@ -206,7 +206,7 @@ mod tests {
     fn features_survive_the_round_trip() {
         let recording = synthetic::walk(60);
         let expected = features(&recording.frames);
-        let mut decoder = Decoder::new(&recording.rig, RADIUS);
+        let mut decoder = Decoder::new(Kernels::detect().unwrap(), &recording.rig, RADIUS);
         // From elsewhere, with a heading close to the seam at half a turn.
         decoder.reset(Root { x: -31.0, z: 12.5, yaw: 3.0 });
         let mut encoder = Encoder::new(RADIUS);
@@ -238,7 +238,7 @@ mod tests {
     #[test]
     fn ten_minutes_do_not_drift() {
         let recording = synthetic::walk(18_000);
-        let mut decoder = Decoder::new(&recording.rig, RADIUS);
+        let mut decoder = Decoder::new(Kernels::detect().unwrap(), &recording.rig, RADIUS);
         decoder.reset(recording.frames[0].root);
         let mut out = Frame::empty(recording.rig.len());
         for x in features(&recording.frames) {
@@ -263,7 +263,7 @@ mod tests {
     fn refuses_what_is_not_finite_and_goes_on() {
         let recording = synthetic::walk(2);
         let x = features(&recording.frames);
-        let mut decoder = Decoder::new(&recording.rig, RADIUS);
+        let mut decoder = Decoder::new(Kernels::detect().unwrap(), &recording.rig, RADIUS);
         let (mut a, mut b) = (Frame::empty(22), Frame::empty(22));
         let mut clean = decoder.clone();
         let mut bad = x[0].clone();

@@ -13,8 +13,8 @@
 //!   [`limb_target`]: the end of a limb is what one sees, and what stands on the floor.
 
 use super::Rig;
-use super::polar::Scalar;
 use crate::frame::{Frame, Root, Transform};
+use crate::kernels::Kernels;
 use glam::{Mat3, Quat, Vec3};
 
 /// Weight of a decoded rotation against a child's position (1) in the least squares of a joint with several children, m^2:
@@ -38,7 +38,7 @@ enum Plan {
 /// Fits the rig to decoded transforms; streaming, because quaternion signs follow the frame before. Allocates nothing.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    kernels: Scalar,
+    kernels: Kernels,
     plans: Vec<Plan>,
     parents: Vec<Option<usize>>,
     offsets: Vec<Vec3>,
@@ -50,10 +50,10 @@ pub struct Fit {
 
 impl Fit {
     /// A fit on `rig`, which has passed [`Rig::check`].
-    pub fn new(rig: &Rig) -> Self {
+    pub fn new(kernels: Kernels, rig: &Rig) -> Self {
         let n = rig.len();
         Self {
-            kernels: Scalar,
+            kernels,
             plans: (0..n).map(|j| plan(rig, j)).collect(),
             parents: rig.joints.iter().map(|j| j.parent).collect(),
             offsets: (0..n).map(|j| rig.offset(j)).collect(),

@@ -12,7 +12,6 @@ mod fit;
 mod gaze;
 mod humanoid;
 pub mod icosahedron;
-mod polar;
 mod rig;
 #[cfg(test)]
 pub(crate) mod synthetic;

@@ -133,7 +133,8 @@ impl Anchor {
                 self.phase = Phase::Encode(to);
                 if to == current {
                     for block in self.started.max(current - (self.capacity - 1).min(current))..current {
-                        self.z.copy_from_slice(self.latent_of(block));
+                        let at = self.slot(block) * self.latent;
+                        self.z.copy_from_slice(&self.latents[at..][..self.latent]);
                         engine.latent.standardise_in_place(&mut self.z);
                         generator.history_mut().replace(block, &self.z);
                     }
@@ -186,10 +187,6 @@ impl Anchor {
         let features = &self.features[slot * self.width..][..self.width];
         let latent = &mut self.latents[slot * self.latent..][..self.latent];
         engine.encoder.step(exec, &mut self.encoder, features, latent);
-    }
-
-    fn latent_of(&self, block: u64) -> &[f32] {
-        &self.latents[self.slot(block) * self.latent..][..self.latent]
     }
 
     fn slot(&self, block: u64) -> usize {

@@ -22,7 +22,6 @@ pub(super) enum Noise {
 }
 
 /// All that changes from block to block.
-#[derive(Debug)]
 pub(super) struct BlockState {
     exec: Exec,
     pub(super) inputs: Inputs,
@@ -136,7 +135,15 @@ impl BlockState {
 
         engine.latent.restore(&mut self.latent);
         engine.decoder.step(&mut self.exec, &mut self.decoder, &self.latent, &mut self.features);
-        self.anchor.step(&mut self.exec, engine, &mut self.generator, &mut self.decoder, &self.latent, &mut self.features, &root);
+        self.anchor.step(
+            &mut self.exec,
+            engine,
+            &mut self.generator,
+            &mut self.decoder,
+            &self.latent,
+            &mut self.features,
+            &root,
+        );
         tell(&mut probe, block, "decoded", &self.features);
 
         engine.pose.restore(&mut self.features);

@@ -2,7 +2,9 @@
 
 use super::probe::{Probe, tell};
 use super::stats::{Delays, InputStats};
-use crate::audio::{AudioEncoder, Voice};
+#[cfg(feature = "tract")]
+use crate::audio::TractEncoder;
+use crate::audio::{AudioBackend, AudioEncoder, Voice};
 use crate::config::Config;
 use crate::engine::Engine;
 use crate::error::Result;
@@ -14,10 +16,9 @@ use crate::user::{HeadTrack, Presence, UserSample};
 use glam::Vec3;
 
 /// A voice and the encoder that listens to it.
-#[derive(Debug)]
 struct Ear {
     voice: Voice,
-    encoder: AudioEncoder,
+    encoder: Hearing,
     features: Vec<f32>,
     /// Blocks by which it lags.
     delay: u64,
@@ -25,8 +26,42 @@ struct Ear {
     open: bool,
 }
 
+/// The audio encoder on either backend.
+enum Hearing {
+    Kernels(AudioEncoder),
+    #[cfg(feature = "tract")]
+    Tract(TractEncoder),
+}
+
+impl Hearing {
+    fn new(engine: &Engine, backend: AudioBackend) -> Result<Self> {
+        Ok(match backend {
+            AudioBackend::Kernels => Self::Kernels(AudioEncoder::new(&engine.config.audio)?),
+            #[cfg(feature = "tract")]
+            AudioBackend::Tract => Self::Tract(engine.audio_source.tract(&engine.config.audio)?),
+        })
+    }
+
+    fn reset(&mut self) -> Result<()> {
+        match self {
+            Self::Kernels(encoder) => encoder.reset(),
+            #[cfg(feature = "tract")]
+            Self::Tract(encoder) => encoder.reset()?,
+        }
+        Ok(())
+    }
+
+    fn encode(&mut self, exec: &mut Exec, engine: &Engine, samples: &[f32], out: &mut [f32]) -> Result<()> {
+        match self {
+            Self::Kernels(encoder) => encoder.encode(exec, &engine.audio, samples, out),
+            #[cfg(feature = "tract")]
+            Self::Tract(encoder) => encoder.encode(samples, out)?,
+        }
+        Ok(())
+    }
+}
+
 /// All inputs of a session.
-#[derive(Debug)]
 pub(super) struct Inputs {
     agent: Ear,
     user: Ear,
@@ -40,7 +75,7 @@ impl Ear {
     fn new(engine: &Engine, options: &SessionOptions, delay: u32) -> Result<Self> {
         Ok(Self {
             voice: Voice::new(),
-            encoder: AudioEncoder::new(&engine.audio, options.audio)?,
+            encoder: Hearing::new(engine, options.audio)?,
             features: vec![0.0; BLOCK_FRAMES * engine.config.audio.features],
             delay: u64::from(delay),
             open: false,
@@ -49,7 +84,6 @@ impl Ear {
 
     fn reset(&mut self) {
         self.voice.reset();
-        self.encoder.reset();
         self.open = false;
     }
 
@@ -67,10 +101,10 @@ impl Ear {
             return Ok(None);
         }
         if !self.open {
-            self.encoder.reset();
+            self.encoder.reset()?;
             self.open = true;
         }
-        self.encoder.encode(exec, &engine.audio, &samples[..], &mut self.features)?;
+        self.encoder.encode(exec, engine, &samples[..], &mut self.features)?;
         Ok(Some(&self.features))
     }
 }
@@ -159,7 +193,11 @@ impl Inputs {
     }
 
     pub(super) fn stats(&self) -> InputStats {
-        InputStats { agent_voice: self.agent.voice.stats(), user_voice: self.user.voice.stats(), head: self.track.stats() }
+        InputStats {
+            agent_voice: self.agent.voice.stats(),
+            user_voice: self.user.voice.stats(),
+            head: self.track.stats(),
+        }
     }
 
     pub(super) fn delays(&self, config: &Config) -> Delays {

@@ -40,7 +40,6 @@ use std::time::Instant;
 ///
 /// Time is the caller's: seconds since the session started, the same clock for [`Session::push_user_head`] and
 /// [`Session::poll`]. Audio has no timestamps: each voice is one continuous stream that starts at time 0.
-#[derive(Debug)]
 pub struct Session {
     engine: Arc<Engine>,
     options: SessionOptions,
@@ -224,5 +223,12 @@ impl Session {
     /// Current options.
     pub fn options(&self) -> &SessionOptions {
         &self.options
+    }
+}
+
+impl std::fmt::Debug for Session {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let name = &self.engine.config.name;
+        f.debug_struct("Session").field("model", name).field("blocks", &self.state.block).finish_non_exhaustive()
     }
 }

@@ -71,7 +71,8 @@ impl Inputs {
                     let t = i as f64 / f64::from(rate);
                     let speaks = (t / 3.0 + turn).rem_euclid(2.0) < 1.0;
                     let level = (std::f64::consts::TAU * 3.7 * t).sin().max(0.0).powi(2);
-                    let tone: f64 = (1..8).map(|h| (std::f64::consts::TAU * pitch * f64::from(h) * t).sin() / f64::from(h)).sum();
+                    let tone: f64 =
+                        (1..8).map(|h| (std::f64::consts::TAU * pitch * f64::from(h) * t).sin() / f64::from(h)).sum();
                     if speaks { (0.2 * level * tone) as f32 } else { 0.0 }
                 })
                 .collect()

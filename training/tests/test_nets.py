@@ -6,7 +6,7 @@ from visavis_train import bundle, goldens, make_tiny
 from visavis_train.nets.audio import AudioEncoder
 from visavis_train.nets.flow import Condition, FlowNet, absent
 from visavis_train.nets.layers import band_mask
-from visavis_train.nets.stream import Reference, Stream, branches
+from visavis_train.nets.stream import DecoderStream, Reference, Stream, branches
 from visavis_train.nets.vae import Vae
 
 
@@ -99,6 +99,14 @@ def test_vae_shapes_causality_and_window():
     further = z.clone()
     further[:, 3] += 1
     assert changed(net.decoder(z), net.decoder(further)) == list(range(12, 24))
+
+
+def test_decoder_stream_equals_one_pass():
+    net = make_tiny.lively(Vae(75, 8, 2, 16, 2, 2, 3)).decoder
+    z = torch.randn(2, 9, 8)
+    stream = DecoderStream(net, 2)
+    parts = [stream.step(z[:, k:k + 1]) for k in range(9)]
+    assert torch.allclose(torch.cat(parts, 1), net(z), atol=1e-5)
 
 
 def test_audio_streams_like_one_pass_and_is_causal():

@@ -4,6 +4,10 @@ use super::super::synthetic::{self, Noise};
 use super::*;
 use crate::recording::Recording;
 
+fn fit_for(rig: &Rig) -> Fit {
+    Fit::new(Kernels::detect().unwrap(), rig)
+}
+
 fn fitted(fit: &mut Fit, joints: &[Transform]) -> Frame {
     let mut frame = Frame::empty(joints.len());
     fit.fit(joints, &Root::default(), &mut frame);
@@ -31,7 +35,7 @@ fn noisy(recording: &Recording, frame: &Frame, share: f32, noise: &mut Noise) ->
 #[test]
 fn exact_input_is_followed_exactly() {
     let recording = synthetic::walk(240);
-    let mut fit = Fit::new(&recording.rig);
+    let mut fit = fit_for(&recording.rig);
     for frame in &recording.frames {
         let got = fitted(&mut fit, &frame.global);
         assert!(got.fit_error < 1e-5, "frame {}: {} m", frame.index, got.fit_error);
@@ -45,7 +49,7 @@ fn exact_input_is_followed_exactly() {
 #[test]
 fn noise_stays_small_and_flips_nothing() {
     let recording = synthetic::walk(600);
-    let mut fit = Fit::new(&recording.rig);
+    let mut fit = fit_for(&recording.rig);
     let mut noise = Noise::new(7);
     let ends: Vec<usize> =
         ["leftHand", "rightHand", "leftFoot", "rightFoot"].map(|n| recording.rig.index(n).unwrap()).into();
@@ -74,7 +78,7 @@ fn noise_stays_small_and_flips_nothing() {
 #[test]
 fn signs_follow_the_frame_before() {
     let recording = synthetic::walk(900);
-    let mut fit = Fit::new(&recording.rig);
+    let mut fit = fit_for(&recording.rig);
     let mut before: Option<Frame> = None;
     for frame in &recording.frames {
         // The sign of the input must not matter.
@@ -105,7 +109,7 @@ fn reaches_the_hand_of_a_bent_arm_with_wrong_lengths() {
 #[test]
 fn degenerate_input_gives_unit_quaternions() {
     let rig = Rig::humanoid();
-    let mut fit = Fit::new(&rig);
+    let mut fit = fit_for(&rig);
     let collapsed = vec![Transform::IDENTITY; rig.len()];
     let mut upside_down = collapsed.clone();
     rig.fk(Vec3::Y, &vec![Quat::IDENTITY; rig.len()], &mut upside_down);
@@ -125,7 +129,7 @@ fn far_from_the_origin_the_heading_frame_keeps_precision() {
     let frame = &recording.frames[1];
     let root = Root { x: 4_000.0, z: -7_000.0, yaw: 1.0 };
     let mut got = Frame::empty(recording.rig.len());
-    Fit::new(&recording.rig).fit(&frame.global, &root, &mut got);
+    fit_for(&recording.rig).fit(&frame.global, &root, &mut got);
     assert!(got.fit_error < 1e-5);
     let turned = root.rotation() * frame.local[0];
     assert!(got.local[0].dot(turned).abs() > 1.0 - 1e-5);

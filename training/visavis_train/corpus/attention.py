@@ -72,14 +72,14 @@ def offsets(rng, level, speaking):
     while t < frames:
         sp = speaking[t]
         shy = 1 - level[t]
-        contact = rng.gamma(3, (0.75 if sp else 1.9) * talkative * (1.0 - 0.5 * min(max(shy, 0), 1)))
+        contact = rng.gamma(3, (0.65 if sp else 1.9) * talkative * (1.0 - 0.5 * min(max(shy, 0), 1)))
         t += int(FPS * contact)
         if t >= frames:
             break
         n = int(FPS * (rng.uniform(0.6, 2.2) if sp else rng.uniform(0.5, 1.6)))
-        size = rng.uniform(0.25, 0.65) + 0.3 * rng.random() * (shy > 0.2)
+        size = rng.uniform(0.3, 0.85) + 0.3 * rng.random() * (shy > 0.2)
         if not sp:
-            size *= 0.65
+            size *= 0.6
         up = rng.random() < (0.4 if sp else 0.15)
         direction = rng.choice([-1, 1])
         amp = np.array([direction * size, (-0.5 if up else rng.uniform(-0.1, 0.7)) * size])

@@ -70,7 +70,7 @@ def pelvis(rng, enc, feet):
         off = rot @ OFFSETS[INDEX[names[0]]]
         d = ankles[:, s] - hips - off
         flat2 = d[:, 0] ** 2 + d[:, 2] ** 2
-        limit = 0.8043
+        limit = 0.8022
         h = ankles[:, s, 1] - off[:, 1] + np.sqrt(np.maximum(limit ** 2 - flat2, 0.30))
         height = np.minimum(height, h)
     height = np.minimum(height, 0.925)
@@ -117,10 +117,11 @@ def _legs(g, hips, hip_rot, feet):
     foot_rot, ankles = feet.ankles()
     for s, (upper, lower, foot, toes) in enumerate(LEGS):
         start = hips + hip_rot @ OFFSETS[INDEX[upper]]
-        knee = rig.unit(0.5 * hip_rot[..., 2] + 0.5 * np.stack([np.sin(feet.yaw[:, s]), 0 * feet.yaw[:, s], np.cos(feet.yaw[:, s])], 1))
+        hip_yaw = rig.yaw_of(hip_rot)
+        knee_yaw = hip_yaw + np.clip(0.5 * rig.wrap(feet.yaw[:, s] - hip_yaw), -0.6, 0.6)
+        knee = np.stack([np.sin(knee_yaw), 0 * knee_yaw, np.cos(knee_yaw)], 1)
         a, b, n = two_bone(start, ankles[:, s], knee, THIGH, SHANK)
-        x = rig.unit(-n)                       # rest: bones along -Y, knee along +Z, (e x w) = +Z x -Y = +X
-        x = np.where(np.sum(x * hip_rot[..., 0], -1, keepdims=True) < 0, -x, x)
+        x = rig.unit(n)                        # rest: bones along -Y, knee along +Z: Z x -Y = +X
         g[:, INDEX[upper]] = frame_from(x=x, y=-a)
         g[:, INDEX[lower]] = frame_from(x=x, y=-b)
         g[:, INDEX[foot]] = foot_rot[:, s]
@@ -145,7 +146,13 @@ def _arms(rng, g, hips, yaw, feet, arms, spd, breath):
         wrist *= np.minimum(1, 0.507 / r)
         lift = 0.20 * np.clip((wrist[:, 1] + 0.30) / 0.45, 0, 1) + 0.010 * np.sin(breath) - 0.02
         g[:, INDEX[shoulder]] = chest @ rig.axis_mat("z", sg * gaussian(lift, 1))
-        up, lo, n = two_bone(np.zeros((frames, 3)), wrist * sign, arms.pole[s] * sign, UPPER, FORE)
+        # elbow: behind a hanging arm, turned with the arm by the shortest rotation, then out by the swivel angle
+        zero = np.zeros(frames)
+        out = arms.swivel[s] + 0.7 * np.clip((0.05 - wrist[:, 0]) / 0.15, 0, 1)   # across the body: elbow clear of the trunk
+        back = np.stack([np.sin(out), zero, -np.cos(out)], 1)
+        down = np.stack([zero, zero - 1, zero], 1)
+        pole = np.einsum("tab,tb->ta", rig.between(down, rig.unit(wrist)), back)
+        up, lo, n = two_bone(np.zeros((frames, 3)), wrist * sign, pole * sign, UPPER, FORE)
         up, lo, n = (np.einsum("tab,tb->ta", chest, v) for v in (up, lo, n))
         y = -n * sg                            # rest: left arm +X bends towards +Z about -Y
         g[:, INDEX[upper]] = frame_from(x=sg * up, y=rig.unit(y))

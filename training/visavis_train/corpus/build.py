@@ -35,9 +35,9 @@ def build(data, out, hours, seed=0, log=print):
         for name, p, r, u in real.two_person(data, split):
             store.save(os.path.join(folder, f"pair_{name}.safetensors"), p, r, u, None, None,
                        {"split": split, "sources": ["cmu_two_person/" + name], "gaze_level": "nan", "seed": str(seed), "kind": "pair"})
-        for name, p, r, u in real.walks(data, split, np.random.default_rng([seed, s, 1])):
+        for name, p, r, u, parts in real.walks(data, split, np.random.default_rng([seed, s, 1])):
             store.save(os.path.join(folder, f"walk_{name}.safetensors"), p, r, u, None, None,
-                       {"split": split, "sources": ["cmu_walk/" + name], "gaze_level": "nan", "seed": str(seed), "kind": "walk"})
+                       {"split": split, "sources": parts, "gaze_level": "nan", "seed": str(seed), "kind": "walk"})
         src = load_sources(data, split)
         left, i = int(split_hours(hours)[split] * 3600 * 30), 0
         while left > 0:

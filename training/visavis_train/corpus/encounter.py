@@ -99,7 +99,7 @@ def simulate(rng, frames, bias, mobility, real_paths=()):
     `real_paths`: head paths [n, 3] of real people of the same split. Returns an Encounter.
     """
     dt = 1.0 / FPS
-    weights = np.array([1.0, 0.7, 0.7, 0.7, 0.5, 0.6, 0.25, 0.4, 0.35])
+    weights = np.array([1.0, 0.7, 0.9, 0.7, 0.5, 0.6, 0.25, 0.4, 0.35])
     weights[1:] *= 0.25 + 1.5 * mobility
     weights[0] *= 2.2 - 1.9 * mobility
     weights /= weights.sum()
@@ -113,7 +113,7 @@ def simulate(rng, frames, bias, mobility, real_paths=()):
     moving, turning = False, abs(first) > 0.7
     threshold, hold = rng.uniform(0.25, 0.6), 0
     slack = rng.uniform(0.3, 0.55)
-    brisk = rng.uniform(0.85, 1.4)
+    brisk = rng.uniform(0.8, 1.3)
     fidget, shift_pos, shift_yaw = int(FPS * rng.uniform(5, 15)), np.zeros(2), 0.0
     U, H, P, Y, V, events = [], [], [], [], [], []
     while len(U) < frames:

@@ -69,7 +69,7 @@ def plan(rng, root, yaw, height=None):
             if going:
                 if cost[1 - f] > cost[f] + 0.22 and since > 2:
                     f = 1 - f
-                start = cost[f] > 0.05 and since >= (2 if speed[t] > 0.9 else 3 if speed[t] > 0.5 or max(cost) > 0.2 else 5)
+                start = cost[f] > 0.05 and since >= (1 if speed[t] > 0.8 or max(cost) > 0.35 else 3 if speed[t] > 0.4 or max(cost) > 0.2 else 5)
             else:
                 f = int(np.argmax(cost))
                 start = (cost[f] > 0.13 and since > 4) or (uneasy > 20 and since > 8)
@@ -77,10 +77,10 @@ def plan(rng, root, yaw, height=None):
                 dur = int(round(FPS * (0.47 - 0.07 * min(speed[t], 1.3) + rng.normal(0, 0.02))))
                 if max(cost) > 0.25:
                     dur -= 2
-                dur = int(np.clip(dur, 9, 16))
+                dur = int(np.clip(dur, 9, 15))
                 land = min(t + dur + int(0.5 * dur * min(1, speed[t] / 0.5)), t_end - 1)
                 goal, gy = _spot(root[land], yaw[land], f, toe_out, spread)
-                dur = max(dur, int(np.ceil(12.2 * np.hypot(*(goal - pos[f])))))  # toe peak speed 1.875 L / T <= 4.6 m/s
+                dur = max(dur, min(14, int(np.ceil(10 * np.hypot(*(goal - pos[f]))))))  # toe peak speed 1.7 L / T about 5 m/s
                 gy = fyaw[1 - f] + np.clip(wrap(gy - fyaw[1 - f]), -1.05, 1.05)
                 goal = _keep_clear(goal, pos[1 - f], fyaw[1 - f], f)
                 busy = (f, t, t + dur, pos[f].copy(), fyaw[f], goal, fyaw[f] + wrap(gy - fyaw[f]))
@@ -91,7 +91,8 @@ def plan(rng, root, yaw, height=None):
         if busy is not None:
             f, a, b, p0, y0, p1, y1 = busy
             u = (t - a) / (b - a)
-            s = minjerk((u - 0.04) / 0.92)
+            c = np.clip((u - 0.05) / 0.9, 0, 1)
+            s = 0.5 * (minjerk(c) + c * c * (3 - 2 * c))
             path = p0 + (p1 - p0) * s
             out = _bulge(p0, p1, pos[1 - f])
             toe[t, f, [0, 2]] = path + out * np.sin(np.pi * s)

@@ -11,23 +11,23 @@ import numpy as np
 from ..motion import rig
 from .signals import FPS, gaussian, keyed, minjerk, smooth_noise
 
-# name: (wrist relative to the shoulder [m], elbow pole direction, palm twist [rad], both hands?)
+# name: (wrist relative to the shoulder [m], elbow swivel outwards [rad], palm twist [rad], both hands?)
 RESTS = {
-    "hang": ((0.07, -0.490, 0.06), (0.25, 0.0, -1.0), 0.15, False),
-    "hang_wide": ((0.12, -0.475, 0.08), (0.4, 0.0, -1.0), 0.3, False),
-    "clasp": ((-0.135, -0.350, 0.235), (0.8, -0.35, -0.35), 0.1, True),
-    "belly": ((-0.09, -0.270, 0.265), (0.9, -0.5, -0.3), 0.25, True),
-    "hip": ((0.045, -0.375, 0.06), (1.0, 0.1, -0.5), 0.5, False),
+    "hang": ((0.07, -0.490, 0.06), 0.25, 0.15, False),
+    "hang_wide": ((0.12, -0.475, 0.08), 0.40, 0.3, False),
+    "clasp": ((-0.135, -0.350, 0.235), 0.75, 0.1, True),
+    "belly": ((-0.09, -0.270, 0.265), 0.80, 0.25, True),
+    "hip": ((0.045, -0.375, 0.06), 1.15, 0.5, False),
 }
-POLE_GESTURE = (0.55, -0.75, -0.35)
+SWIVEL_GESTURE = 0.5
 
 
 @dataclass
 class Arms:
-    """Per side (0 left, 1 right): wrist [2, T, 3] in the mirrored shoulder frame, pole [2, T, 3], twist [2, T]; the
+    """Per side (0 left, 1 right): wrist [2, T, 3] in the mirrored shoulder frame, elbow swivel [2, T], twist [2, T]; the
     gesture mask [2, T]."""
     wrist: np.ndarray
-    pole: np.ndarray
+    swivel: np.ndarray
     twist: np.ndarray
     active: np.ndarray
 
@@ -70,8 +70,8 @@ def _draw_spot(rng, spots, size):
 def limit(p):
     """Keeps wrists [..., 3] within reach and in front of the trunk."""
     p = np.array(p, float)
-    p[..., 2] = np.maximum(p[..., 2], np.where(p[..., 0] < 0.02, 0.19, 0.04))
     p[..., 0] = np.maximum(p[..., 0], -0.15)
+    p[..., 2] = np.maximum(p[..., 2], 0.03 + 0.16 * np.clip((0.08 - p[..., 0]) / 0.11, 0, 1) * np.clip((p[..., 1] + 0.49) / 0.06, 0, 1))
     p[..., 1] = np.minimum(p[..., 1], 0.02 + 0.12 * np.tanh(np.maximum(p[..., 1], 0.0)))
     r = np.linalg.norm(p, axis=-1, keepdims=True)
     return p * np.minimum(1.0, 0.505 / np.maximum(r, 1e-6)) * np.maximum(1.0, 0.20 / np.maximum(r, 1e-6))
@@ -96,7 +96,7 @@ def _rest_plan(rng, frames):
 
 def plan(rng, frames, peaks, strength, phrases, spots, motifs, liveliness, walk_speed):
     """Arms for a clip. `peaks`, `strength`: prosodic peaks of the agent's voice; `liveliness` 0..1; walk_speed [T]."""
-    wrist, pole, twist = np.zeros((2, frames, 3)), np.zeros((2, frames, 3)), np.zeros((2, frames))
+    wrist, swivel, twist = np.zeros((2, frames, 3)), np.zeros((2, frames)), np.zeros((2, frames))
     active = np.zeros((2, frames))
     rests = _rest_plan(rng, frames)
     jitter = {n: [rng.normal(0, 0.012, 3) for _ in range(2)] for n in RESTS}
@@ -105,9 +105,9 @@ def plan(rng, frames, peaks, strength, phrases, spots, motifs, liveliness, walk_
         times, w, po, tw = [], [], [], []
 
         def key(t, pos, pl, ang):
-            if times and t <= times[-1]:
+            if times and t - times[-1] < 4:            # closer keys would jerk
                 return
-            times.append(t), w.append(np.asarray(pos, float)), po.append(np.asarray(pl, float)), tw.append(float(ang))
+            times.append(t), w.append(np.asarray(pos, float)), po.append(float(pl)), tw.append(float(ang))
 
         def rest_at(t):
             name = [p for s, p in rests if s <= max(t, 0)][-1][side]
@@ -151,13 +151,13 @@ def plan(rng, frames, peaks, strength, phrases, spots, motifs, liveliness, walk_
         live = 0.004 + 0.010 * a                     # small drift, more in gesture than at rest
         p += np.stack([smooth_noise(rng, frames, pr, 1.0) * live for pr in (0.9, 0.8, 1.0)], 1)
         wrist[side] = gaussian(limit(p), 1.0)
-        pole[side] = keyed(frames, times, np.array(po))
-        twist[side] = keyed(frames, times, np.array(tw)) + smooth_noise(rng, frames, 1.2, 0.03)
-    return Arms(wrist, pole, twist, active)
+        swivel[side] = gaussian(keyed(frames, times, np.array(po)), 1.5)
+        twist[side] = gaussian(keyed(frames, times, np.array(tw)), 1.5) + smooth_noise(rng, frames, 1.2, 0.03)
+    return Arms(wrist, swivel, twist, active)
 
 
 def _stroke_plan(rng, strokes, size, spots, motifs):
-    """Per stroke: apex, raise of the preparation, palm angle, elbow pole, frames before and after, motif or None."""
+    """Per stroke: apex, raise of the preparation, palm angle, elbow swivel, frames before and after, motif or None."""
     out, spot = [], _draw_spot(rng, spots, size)
     for _, s in strokes:
         reach = size * (0.55 + 0.6 * min(s, 1.2))
@@ -167,7 +167,7 @@ def _stroke_plan(rng, strokes, size, spots, motifs):
         motif = None
         if len(motifs) and rng.random() < 0.4:
             motif = motifs[rng.integers(len(motifs))] * (0.2 + 0.2 * reach) * [1, 0.8, 0.8]
-        out.append((spot, raise_, rng.normal(-0.35, 0.45), np.array(POLE_GESTURE) + rng.normal(0, 0.12, 3),
+        out.append((spot, raise_, rng.normal(-0.35, 0.45), SWIVEL_GESTURE + rng.normal(0, 0.15),
                     int(round(FPS * rng.uniform(0.19, 0.27))), int(FPS * rng.uniform(0.15, 0.25)), motif))
     return out
 
@@ -176,7 +176,7 @@ def _units(rng, peaks, strength, liveliness, spots, motifs):
     """Groups stressed peaks into gesture units of 1-6 strokes."""
     units, i = [], 0
     while i < len(peaks):
-        if rng.random() > 0.40 + 0.6 * liveliness:
+        if rng.random() > 0.45 + 0.6 * liveliness:
             i += int(rng.integers(1, 4))
             continue
         strokes, n = [(peaks[i], strength[i])], int(rng.integers(1, 6))
@@ -190,5 +190,4 @@ def _units(rng, peaks, strength, liveliness, spots, motifs):
         size = np.clip(rng.normal(0.5 + 0.65 * liveliness, 0.2), 0.25, 1.3)
         units.append({"strokes": strokes, "hands": hands, "sym": len(hands) == 2 and rng.random() < 0.6,
                       "plans": [_stroke_plan(rng, strokes, size, spots, motifs) for _ in (0, 1)]})
-        i += int(rng.integers(0, 2))
     return units

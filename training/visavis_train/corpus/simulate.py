@@ -51,7 +51,7 @@ def simulate_clip(rng, frames, src, level_quantile=None):
         peaks, strength = voices.stress_peaks(loud, agent_phrases)
     else:
         peaks, strength = [], np.zeros(0)
-    liveliness = rng.beta(2.0, 1.6)
+    liveliness = rng.beta(2.2, 1.3)
     arms = gestures.plan(rng, frames, peaks, strength, agent_phrases, src.spots, src.motifs, liveliness, enc.speed)
     eye = np.stack([enc.root[:, 0], np.full(frames, 1.56), enc.root[:, 1]], 1)
     yaw, pitch, roll = attention.head_angles(rng, eye, enc.user, offset, None, enc.yaw)

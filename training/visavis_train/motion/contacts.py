@@ -80,10 +80,9 @@ def lock_feet(positions, rotations):
     for leg, ankle in zip(LEGS, ankles):
         up, lo = INDEX[leg[0]], INDEX[leg[1]]
         start = hips + g[:, 0] @ OFFSETS[up]
-        pole = rig.unit(0.85 * g[:, up, :, 2] + 0.15 * g[:, lo, :, 2])  # knees bend towards the thigh's +Z
+        pole = g[:, up, :, 2]                            # knees bend towards the thigh's +Z
         a, b, n = two_bone(start, ankle, pole, THIGH, SHANK)
-        x = rig.unit(-n)
-        x = np.where(np.sum(x * g[:, up, :, 0], -1, keepdims=True) < 0, -x, x)
+        x = rig.unit(n)
         for j, y in ((up, -a), (lo, -b)):
             g[:, j] = np.stack([x, y, np.cross(x, y)], -1)
     return rig.fk_global(hips, g), g

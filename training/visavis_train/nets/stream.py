@@ -6,7 +6,7 @@ and is exact against it; it rolls out many sequences at once.
 import torch
 
 from .flow import GAZE, cat_conditions
-from .layers import gelu, modulated, rotary
+from .layers import gelu, modulated, rotary, rotate
 
 
 def branches(cond, gaze):
@@ -105,9 +105,7 @@ class Stream:
         for i, layer in enumerate(net.layers):
             shift1, scale1, gate1, shift2, scale2, gate2 = layer.modulation(c)
             q, k, v = layer.attn.qkv(modulated(x, shift1, scale1)).unflatten(-1, (3, net.heads, -1)).unbind(2)
-            a, b = cos[:, None], sin[:, None]
-            turn = lambda t: torch.cat([t.chunk(2, -1)[0] * a - t.chunk(2, -1)[1] * b, t.chunk(2, -1)[0] * b + t.chunk(2, -1)[1] * a], -1)
-            q, k = turn(q), turn(k)
+            q, k = rotate(q, cos, sin), rotate(k, cos, sin)
             old_k, old_v = cache.kv[i][:, :, cache.kv.shape[3] - keep:]
             all_k, all_v = torch.cat([old_k, k], 1), torch.cat([old_v, v], 1)
             s = keep + r
@@ -161,3 +159,31 @@ class Stream:
         self.previous = (z, eps, now)
         self.position += 1
         return z
+
+
+class DecoderStream:
+    """The VAE's decoder block by block with a cache of keys and values; equals decoding everything at once."""
+
+    def __init__(self, decoder, batch):
+        self.net, self.position = decoder, 0
+        self.cache = [None] * len(decoder.layers)
+
+    @torch.no_grad()
+    def step(self, z):
+        """Latents [B, 1, Dz] (not standardised) -> standardised frames [B, 4, F]."""
+        net, t = self.net, self.net.tokens
+        first = net.latent(z)
+        x = torch.cat([first, net.frame_token.expand(len(z), -1, -1)], 1) + net.slot
+        cos, sin = rotary(torch.arange(self.position * t, (self.position + 1) * t), net.head_dim)
+        causal = torch.zeros(t, t).masked_fill(torch.triu(torch.ones(t, t, dtype=torch.bool), 1), -1e9)
+        for i, layer in enumerate(net.layers):
+            q, k, v = layer.attn.qkv(layer.ln1(x)).unflatten(-1, (3, layer.attn.heads, -1)).unbind(2)
+            q, k = rotate(q, cos, sin), rotate(k, cos, sin)
+            if self.cache[i] is not None:
+                k, v = torch.cat([self.cache[i][0], k], 1), torch.cat([self.cache[i][1], v], 1)
+            self.cache[i] = (k[:, -(net.window - 1) * t:], v[:, -(net.window - 1) * t:]) if net.window > 1 else None
+            bias = torch.cat([torch.zeros(t, k.shape[1] - t), causal], 1)
+            x = x + layer.attn.proj(layer.attn.attend(q, k, v, bias))
+            x = x + layer.fc2(gelu(layer.fc1(layer.ln2(x))))
+        self.position += 1
+        return net.out(net.ln_f(x)[:, 1:])

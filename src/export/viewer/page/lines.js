@@ -1,0 +1,74 @@
+// Lines as thin triangles, for both renderers: {points: [from, to], width (m), colour: [r, g, b, a] at both ends}.
+
+// The user's way on the floor as pieces between known positions, thinned to 15 a second.
+function trailPieces(d) {
+  const pieces = [];
+  const known = (i) => !Number.isNaN(d.user[3 * i]);
+  const at = (i) => [d.user[3 * i], 0.004, d.user[3 * i + 2]];
+  for (let i = 0; i + 2 < d.frames; i += 2) {
+    if (known(i) && known(i + 1) && known(i + 2)) pieces.push({ from: at(i), to: at(i + 2), frame: i });
+  }
+  return pieces;
+}
+
+// Everything drawn as lines in one moment.
+function sceneLines(d, pose, pieces, options) {
+  const out = [];
+  const line = (from, to, width, c0, c1 = c0, flat = false) => out.push({ from, to, width, c0, c1, flat });
+  for (const piece of pieces) {
+    const past = piece.frame <= pose.frame;
+    const alpha = past ? mix(0.28, 0.95, smoothstep(8 * d.fps, 0, pose.frame - piece.frame)) : 0.10;
+    const colour = [...timeColour(piece.frame / d.frames), alpha];
+    line(piece.from, piece.to, past ? 0.034 : 0.02, colour, colour, true);
+  }
+  if (pose.user && !options.fromUser) {
+    const foot = [pose.user[0], 0.006, pose.user[2]], c = timeColour(pose.frame / d.frames);
+    ring(foot, 0.13, [...c, 0.9]);
+    line(foot, add(pose.user, [0, -0.14, 0]), 0.006, [...c, 0.75], [...c, 0.15]);
+  }
+  if (pose.eyes) {
+    const c = gazeColour(Number.isNaN(pose.gaze) ? 0 : pose.gaze);
+    const start = add(pose.eyes, scale(pose.facing, 0.03));
+    const far = pose.user ? Math.min(2.2, length(sub(pose.user, pose.eyes))) : 1.2;
+    line(start, add(pose.eyes, scale(pose.facing, far)), 0.016, [...c, 0.9], [...c, 0]);
+    if (pose.user && !options.fromUser) dashes(pose.eyes, add(pose.user, scale(unit(sub(pose.eyes, pose.user)), 0.13)), c);
+  }
+  if (options.joints) {
+    const decoded = pose.decoded(), c = [1, 0.85, 0.3];
+    decoded.forEach((p, j) => {
+      const parent = d.joints[j].parent;
+      line(add(p, [0, -0.009, 0]), add(p, [0, 0.009, 0]), 0.018, [...c, 0.95]);
+      if (parent !== null) line(decoded[parent], p, 0.006, [...c, 0.8]);
+    });
+  }
+  return out;
+
+  function ring(centre, radius, colour) {
+    for (let k = 0; k < 28; k++) {
+      const p = (a) => add(centre, [radius * Math.sin(a), 0, radius * Math.cos(a)]);
+      line(p((k * Math.PI) / 14), p(((k + 1) * Math.PI) / 14), 0.014, colour, colour, true);
+    }
+  }
+
+  function dashes(from, to, colour) {
+    const n = Math.max(1, Math.round(length(sub(to, from)) / 0.09));
+    for (let k = 2; k < n; k++) line(lerp(from, to, k / n), lerp(from, to, (k + 0.45) / n), 0.009, [...colour, 0.62]);
+  }
+}
+
+// Two triangles a line, 7 floats a vertex; flat lines lie on the floor, others face the eye.
+function lineVertices(lines, eye) {
+  const out = new Float32Array(lines.length * 42);
+  let o = 0;
+  for (const { from, to, width, c0, c1, flat } of lines) {
+    const along = sub(to, from);
+    const side = scale(unit(flat ? [along[2], 0, -along[0]] : cross(along, sub(eye, from))), width / 2);
+    const [a, b, c, e] = [add(from, side), sub(from, side), add(to, side), sub(to, side)];
+    for (const [p, colour] of [[a, c0], [b, c0], [c, c1], [c, c1], [b, c0], [e, c1]]) {
+      out.set(p, o);
+      out.set(colour, o + 3);
+      o += 7;
+    }
+  }
+  return out;
+}

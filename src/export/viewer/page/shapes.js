@@ -1,0 +1,141 @@
+// A person of round cones on the rig's rest pose. A shape: {bone, a, b, ra, rb, k (blend), s (squeeze of x, y, z), tint}.
+// Sizes are those of an adult whose eyes are 1.58 m above the floor, scaled to the rig's.
+
+const TINT = { body: 0, skin: 1, hair: 2, eye: 3, shell: 4, visor: 5 };
+
+function createShapes(d) {
+  const joint = (name) => d.index.get(name);
+  const at = (name) => d.rest[joint(name)];
+  const has = (...names) => names.every((name) => joint(name) !== undefined);
+  const head = has("head") ? at("head") : [0, 1.5, 0];
+  const u = Math.max(0.2, head[1] + d.eyes[1]) / 1.58;
+  const parts = { body: [], head: [], hair: [], eyes: [], leftHand: [], rightHand: [] };
+
+  const put = (part, bone, a, b, ra, rb, extra = {}) => {
+    if (!has(bone)) return;
+    parts[part].push({ bone: joint(bone), a, b, ra: ra * u, rb: rb * u, k: 0.03 * u, s: [1, 1, 1], ...extra });
+  };
+  const from = (p, x, y, z) => add(p, [x * u, y * u, z * u]);
+  const flat = (z, k = 0.05) => ({ s: [1, 1, z], k: k * u });
+
+  if (has("hips", "leftUpperLeg", "rightUpperLeg")) {
+    const [l, r, c] = [at("leftUpperLeg"), at("rightUpperLeg"), at("hips")];
+    put("body", "hips", from(lerp(l, c, 0.35), 0, 0.035, -0.005), from(lerp(r, c, 0.35), 0, 0.035, -0.005), 0.106, 0.106, { ...flat(1.05), core: true });
+    put("body", "hips", from(l, 0, 0.01, -0.035), from(l, 0, 0, -0.035), 0.085, 0.085);
+    put("body", "hips", from(r, 0, 0.01, -0.035), from(r, 0, 0, -0.035), 0.085, 0.085);
+  }
+  if (has("spine", "chest")) put("body", "spine", from(at("spine"), 0, 0, 0.012), from(at("chest"), 0, 0, 0.012), 0.122, 0.12, { ...flat(1.24), core: true });
+  if (has("chest")) put("body", "chest", from(at("chest"), 0.035, 0.04, 0.012), from(at("chest"), -0.035, 0.04, 0.012), 0.112, 0.112, { ...flat(1.15), core: true });
+  if (has("upperChest")) {
+    const c = at("upperChest");
+    put("body", "upperChest", from(c, 0.07, 0.02, 0.012), from(c, -0.07, 0.02, 0.012), 0.112, 0.112, { ...flat(1.12), core: true });
+    put("body", "upperChest", from(c, 0.075, 0.075, -0.012), from(c, -0.075, 0.075, -0.012), 0.08, 0.08, flat(1.05));
+  }
+  if (has("neck")) {
+    const n = at("neck"), top = lerp(n, head, 1.25);
+    put("body", "neck", from(n, 0, -0.02, -0.004), from(top, 0, 0, -0.004), 0.056, 0.05, { k: 0.045 * u });
+  }
+  for (const [side, x] of [["left", 1], ["right", -1]]) {
+    limb(side, x);
+    leg(side, x);
+    hand(side, x);
+  }
+  skull();
+
+  function limb(side, x) {
+    const names = ["Shoulder", "UpperArm", "LowerArm", "Hand"].map((n) => side + n);
+    if (!has(...names.slice(1))) return;
+    const [, upper, lower, wrist] = names.map((n) => at(n));
+    if (has(names[0], "neck")) {
+      put("body", names[0], from(at("neck"), 0.03 * x, -0.005, -0.012), from(upper, -0.03 * x, 0.03, -0.006), 0.043, 0.044, { k: 0.06 * u });
+      put("body", names[0], from(upper, -0.05 * x, -0.005, 0), from(upper, -0.01 * x, 0, 0), 0.066, 0.06, { k: 0.05 * u });
+    }
+    put("body", names[1], from(upper, 0.005 * x, 0, 0), lerp(upper, lower, 0.35), 0.061, 0.051, { ball: true });
+    put("body", names[1], lerp(upper, lower, 0.3), lower, 0.051, 0.041, { shade: true });
+    put("body", names[2], lower, lerp(lower, wrist, 0.3), 0.041, 0.043, { ball: true });
+    put("body", names[2], lerp(lower, wrist, 0.3), wrist, 0.043, 0.027, { shade: true });
+  }
+
+  function leg(side, x) {
+    const names = ["UpperLeg", "LowerLeg", "Foot", "Toes"].map((n) => side + n);
+    if (!has(...names.slice(0, 3))) return;
+    const [hip, knee, ankle] = names.slice(0, 3).map((n) => at(n));
+    put("body", names[0], from(hip, 0.004 * x, 0, 0), lerp(hip, knee, 0.45), 0.088, 0.077, { ball: true });
+    put("body", names[0], lerp(hip, knee, 0.4), knee, 0.078, 0.057, { shade: true });
+    put("body", names[1], knee, lerp(knee, ankle, 0.3), 0.057, 0.056, { ball: true });
+    put("body", names[1], from(lerp(knee, ankle, 0.26), 0, 0, -0.02), from(lerp(knee, ankle, 0.4), 0, 0, -0.016), 0.045, 0.042);
+    put("body", names[1], lerp(knee, ankle, 0.3), ankle, 0.056, 0.038, { shade: true });
+    const toes = has(names[3]) ? at(names[3]) : from(ankle, 0, -0.06, 0.13);
+    const sole = (p, r, z) => [p[0], r * u, p[2] + z * u];
+    put("body", names[2], sole(ankle, 0.036, -0.028), sole(ankle, 0.036, -0.02), 0.037, 0.037);
+    put("body", names[2], sole(ankle, 0.034, -0.01), sole(toes, 0.03, 0), 0.036, 0.034, { s: [0.9, 1, 1], shade: true });
+    put("body", names[2], from(ankle, 0, -0.01, 0), from(lerp(ankle, toes, 0.6), 0, 0.012, 0), 0.038, 0.03);
+    put("body", has(names[3]) ? names[3] : names[2], sole(toes, 0.029, 0), sole(toes, 0.026, 0.05), 0.033, 0.028, { s: [0.85, 1, 1] });
+  }
+
+  function hand(side, x) {
+    const name = side + "Hand";
+    if (!has(name)) return;
+    const w = at(name), part = name;
+    const p = (along, up, forward) => from(w, along * x, up, forward);
+    const tight = { k: 0.012 * u, tint: TINT.skin };
+    put(part, name, p(-0.03, 0, 0), p(0.01, 0, 0), 0.026, 0.024, tight);
+    put(part, name, p(0.02, 0, 0.012), p(0.082, -0.002, 0.024), 0.017, 0.013, { ...tight, k: 0.02 * u, shade: true });
+    put(part, name, p(0.02, 0, -0.012), p(0.078, -0.002, -0.022), 0.017, 0.013, { ...tight, k: 0.02 * u });
+    [[0.088, 0.028, 0.066], [0.091, 0.0095, 0.074], [0.088, -0.009, 0.068], [0.08, -0.027, 0.054]].forEach(([along, forward, long]) => {
+      const middle = p(along + 0.55 * long, -0.012, forward * 1.04), tip = p(along + 0.92 * long, -0.034, forward * 1.02);
+      put(part, name, p(along - 0.01, -0.001, forward), middle, 0.0098, 0.0088, { ...tight, k: 0.004 * u });
+      put(part, name, middle, tip, 0.0088, 0.0072, { ...tight, k: 0.004 * u });
+    });
+    put(part, name, p(0.015, -0.006, 0.02), p(0.05, -0.014, 0.05), 0.015, 0.0115, tight);
+    put(part, name, p(0.05, -0.014, 0.05), p(0.082, -0.022, 0.06), 0.0112, 0.0085, tight);
+  }
+
+  function skull() {
+    if (!has("head")) return;
+    // The eyes' midpoint is a given; the head is built back from it.
+    const long = clamp(length(sub(d.eyes, d.headBack)), 0.15 * u, 0.25 * u) / u;
+    const c = from(add(head, d.eyes), 0, 0, -0.5 * long);
+    const h = 0.5 * long;
+    const p = (x, y, z) => from(c, x, y, z);
+    const soft = (k, s = [1, 1, 1]) => ({ k: k * u, s, tint: TINT.skin });
+    put("head", "head", p(0, 0.028, -0.012), p(0, 0.022, 0.008), h - 0.004, h - 0.008, { ...soft(0.02, [1.2, 1, 1]), shade: true });
+    put("head", "head", p(0, -0.02, 0.018), p(0, -0.086, 0.05), 0.066, 0.031, soft(0.03, [1.02, 1, 1]));
+    put("head", "head", p(0.033, -0.024, 0.045), p(-0.033, -0.024, 0.045), 0.03, 0.03, soft(0.03));
+    put("head", "head", p(0.03, 0.02, h - 0.024), p(-0.03, 0.02, h - 0.024), 0.013, 0.013, soft(0.014));
+    put("head", "head", p(0, 0.006, h - 0.006), p(0, -0.033, h + 0.008), 0.0065, 0.0115, soft(0.012));
+    put("head", "head", p(0.009, -0.036, h + 0.001), p(-0.009, -0.036, h + 0.001), 0.008, 0.008, soft(0.008));
+    put("head", "head", p(0.014, -0.066, h - 0.012), p(-0.014, -0.066, h - 0.012), 0.007, 0.007, soft(0.01));
+    put("head", "head", p(0.014, -0.077, h - 0.015), p(-0.014, -0.077, h - 0.015), 0.007, 0.007, soft(0.01));
+    for (const x of [1, -1]) {
+      put("head", "head", p(0.079 * x, 0.004, -0.008), p(0.077 * x, -0.03, -0.002), 0.017, 0.011, soft(0.008, [1.7, 1, 1]));
+      put("eyes", "head", p(0.032 * x, 0, h - 0.0125), p(0.032 * x, 0, h - 0.0125), 0.0125, 0.0125, { tint: TINT.eye, k: 0.001, s: [0.95, 1.05, 1] });
+      put("hair", "head", p(0.034 * x, 0.024, h - 0.0062), p(0.017 * x, 0.022, h - 0.001), 0.0035, 0.004, { tint: TINT.hair, k: 0.001 });
+    }
+    // A cap of hair: a larger skull, cut away below the hairline and in front of the ears.
+    const cut = { tint: TINT.hair, k: 0.012 * u, s: [1.18, 1, 1] };
+    const plane = (n, q) => { const v = unit(n); return [...v, dot(v, q)]; };
+    put("hair", "head", p(0, 0.034, -0.016), p(0, 0.03, 0.004), h + 0.006, h + 0.001, { ...cut, cut: plane([0, -0.62, 1], p(0, 0.052, 0.062)) });
+    put("hair", "head", p(0, 0.0, -0.03), p(0, -0.03, -0.038), h - 0.014, h - 0.03, { ...cut, cut: plane([0, -0.25, 1], p(0, 0, -0.012)) });
+  }
+
+  const named = (name, fallback) => (has(name) ? at(name) : fallback);
+  const wrist = has("leftHand") ? Math.abs(at("leftHand")[0]) : 1e3;
+  return {
+    parts,
+    all: Object.values(parts).flat(),
+    unit: u,
+    // Where the clothes end, in the rest pose: [soles, waist, collar (y)] and the cuffs (|x|).
+    cloth: [named("leftFoot", [0, 0.08, 0])[1] - 0.006 * u, named("hips", [0, 0.9, 0])[1] + 0.035 * u, named("neck", [0, 1.4, 0])[1] + 0.012 * u, wrist - 0.03 * u],
+  };
+}
+
+// The user: an egg of a head that wears a headset, around the origin, facing +Z.
+function headsetShapes() {
+  const shape = (a, b, r, tint, s = [1, 1, 1]) => ({ bone: 0, a, b, ra: r, rb: r, k: 0.012, s, tint });
+  return {
+    head: [shape([0, 0.03, -0.01], [0, 0.02, 0.005], 0.09, TINT.shell, [1.18, 1, 1]), { ...shape([0, -0.03, 0.015], [0, -0.09, 0.04], 0.06, TINT.shell), rb: 0.03, k: 0.03 }],
+    visor: [shape([0.052, 0.006, 0.098], [-0.052, 0.006, 0.098], 0.042, TINT.visor, [1, 1, 1.35])],
+    strap: [shape([0, 0.014, -0.006], [0, 0.01, 0.01], 0.096, TINT.visor, [1.17, 4.4, 1])],
+  };
+}

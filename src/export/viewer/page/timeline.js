@@ -1,0 +1,106 @@
+// The lanes at the foot of the page: both voices, gaze, and the play head. Click or drag to seek.
+
+function createTimeline(canvas, d, onSeek) {
+  const g = canvas.getContext("2d");
+  const lanes = [
+    { name: "Agent", kind: "voice", samples: d.agentVoice, colour: "--agent" },
+    { name: "User", kind: "voice", samples: d.userVoice, colour: "--user" },
+    { name: "Gaze", kind: "gaze" },
+  ];
+  const still = document.createElement("canvas");
+  let key = "";
+  const margin = (ratio) => 46 * ratio;
+
+  // Largest sample of each pixel column, 0 to 1 of the voice's loudest.
+  function peaks(samples, columns) {
+    const out = new Float32Array(columns), per = (d.duration * d.audioRate) / columns;
+    let top = 1;
+    for (let c = 0; c < columns; c++) {
+      const end = Math.min(samples.length, Math.ceil((c + 1) * per));
+      for (let i = Math.floor(c * per); i < end; i++) out[c] = Math.max(out[c], Math.abs(samples[i]));
+      top = Math.max(top, out[c]);
+    }
+    return out.map((p) => p / top);
+  }
+
+  // Draws all lanes once in full colour; the part still to come is dimmed when shown.
+  function paint(w, h, ratio, style) {
+    still.width = w;
+    still.height = h;
+    const s = still.getContext("2d"), left = margin(ratio), wide = w - left, high = h / 3;
+    const variable = (name) => style.getPropertyValue(name).trim();
+    s.font = `500 ${11 * ratio}px ${style.fontFamily}`;
+    s.textBaseline = "middle";
+    lanes.forEach((lane, row) => {
+      const middle = (row + 0.5) * high, half = 0.42 * high;
+      s.fillStyle = variable("--dim");
+      s.fillText(lane.name, 0, middle);
+      s.fillStyle = variable("--line");
+      s.fillRect(left, Math.round(middle), wide, 1);
+      if (lane.kind === "gaze") return gaze(s, left, wide, middle, half, ratio, variable);
+      if (!lane.samples) {
+        s.fillStyle = variable("--dim");
+        return s.fillText("no voice", left + 8 * ratio, middle - 7 * ratio);
+      }
+      s.fillStyle = variable(lane.colour);
+      const bar = Math.max(1, Math.round(2 * ratio)), gap = Math.max(1, Math.round(ratio));
+      const tops = peaks(lane.samples, Math.max(1, Math.floor(wide / (bar + gap))));
+      tops.forEach((p, i) => { if (p > 0.01) s.fillRect(left + i * (bar + gap), middle - p * half, bar, Math.max(1, 2 * p * half)); });
+    });
+  }
+
+  function gaze(s, left, wide, middle, half, ratio, variable) {
+    // From 0 at the lane's foot to 1 at its top; below 0 counts as 0.
+    const y = (score) => middle + half - 2 * half * clamp(score, 0, 1);
+    if (d.gazeTarget !== null) {
+      s.setLineDash([4 * ratio, 4 * ratio]);
+      s.strokeStyle = variable("--dim");
+      s.beginPath();
+      s.moveTo(left, y(d.gazeTarget));
+      s.lineTo(left + wide, y(d.gazeTarget));
+      s.stroke();
+      s.setLineDash([]);
+    }
+    s.lineWidth = 1.75 * ratio;
+    s.lineJoin = "round";
+    const every = Math.max(1, Math.floor(d.frames / wide));
+    for (let i = 0; i + every < d.frames; i += every) {
+      const [a, b] = [d.gaze[i], d.gaze[i + every]];
+      if (Number.isNaN(a) || Number.isNaN(b)) continue;
+      s.strokeStyle = css(gazeColour(0.5 * (a + b)));
+      s.beginPath();
+      s.moveTo(left + (wide * i) / d.frames, y(a));
+      s.lineTo(left + (wide * (i + every)) / d.frames, y(b));
+      s.stroke();
+    }
+  }
+
+  const timeAt = (event) => {
+    const box = canvas.getBoundingClientRect();
+    return clamp((event.clientX - box.left - margin(1)) / (box.width - margin(1)), 0, 1) * d.duration;
+  };
+  canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); onSeek(timeAt(event)); });
+  canvas.addEventListener("pointermove", (event) => { if (canvas.hasPointerCapture(event.pointerId)) onSeek(timeAt(event)); });
+
+  return {
+    draw(time, theme) {
+      const ratio = window.devicePixelRatio || 1, box = canvas.getBoundingClientRect();
+      const w = Math.round(box.width * ratio), h = Math.round(box.height * ratio);
+      if (!w || !h) return;
+      if (canvas.width !== w) canvas.width = w;
+      if (canvas.height !== h) canvas.height = h;
+      const style = getComputedStyle(canvas);
+      if (key !== (key = `${w} ${h} ${theme}`)) paint(w, h, ratio, style);
+      const head = margin(ratio) + ((w - margin(ratio)) * time) / Math.max(d.duration, 1e-6);
+      g.clearRect(0, 0, w, h);
+      g.globalAlpha = 0.36;
+      g.drawImage(still, 0, 0);
+      g.globalAlpha = 1;
+      if (head >= 1) g.drawImage(still, 0, 0, head, h, 0, 0, head, h);
+      g.fillStyle = style.color;
+      g.beginPath();
+      g.roundRect(head - ratio, 0, 2 * ratio, h, ratio);
+      g.fill();
+    },
+  };
+}
