@@ -83,7 +83,8 @@ fn variants(all: &[(&str, &str)]) -> String {
             None => groups.push((variant, vec![operation])),
         }
     }
-    let groups: Vec<_> = groups.into_iter().map(|(name, operations)| format!("{name}: {}", operations.join(" "))).collect();
+    let groups: Vec<_> =
+        groups.into_iter().map(|(name, operations)| format!("{name}: {}", operations.join(" "))).collect();
     groups.join("; ")
 }
 

@@ -10,7 +10,8 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     if !args.json {
         return print(&contents.to_string());
     }
-    let json = serde_json::to_string_pretty(&contents)
-        .map_err(|e| Error::new(ErrorKind::BundleInvalid, format!("cannot be shown as JSON: {e}")).with_path(&args.file))?;
+    let json = serde_json::to_string_pretty(&contents).map_err(|e| {
+        Error::new(ErrorKind::BundleInvalid, format!("cannot be shown as JSON: {e}")).with_path(&args.file)
+    })?;
     print(&(json + "\n"))
 }

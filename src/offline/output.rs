@@ -31,7 +31,8 @@ impl OutputFolder {
     pub fn prepare(folder: impl AsRef<Path>) -> Result<Self> {
         let folder = folder.as_ref();
         let mut this = Self { folder: folder.to_path_buf(), staging: PathBuf::new(), made: Vec::new() };
-        let missing = folder.ancestors().take_while(|p| !p.as_os_str().is_empty() && std::fs::symlink_metadata(p).is_err());
+        let missing =
+            folder.ancestors().take_while(|p| !p.as_os_str().is_empty() && std::fs::symlink_metadata(p).is_err());
         let mut missing: Vec<_> = missing.map(Path::to_path_buf).collect();
         missing.reverse();
         for path in missing {

@@ -20,7 +20,8 @@ pub fn for_session(path: &UserPath) -> Vec<(f64, Vec3)> {
         out.push(pair[0]);
         let gap = t1 - t0;
         // A ten-thousandth of tolerance: 60 Hz written with six decimals is not sparse.
-        if gap <= SPARSE * 1.0001 || gap > HOLD_SECONDS || f64::from(p0.distance(p1)) > f64::from(TELEPORT_SPEED) * gap {
+        if gap <= SPARSE * 1.0001 || gap > HOLD_SECONDS || f64::from(p0.distance(p1)) > f64::from(TELEPORT_SPEED) * gap
+        {
             continue;
         }
         let steps = (gap * RATE).ceil() as u32;
@@ -55,12 +56,9 @@ mod tests {
 
     #[test]
     fn fast_recordings_gaps_and_jumps_stay() {
-        for text in [
-            "0,0,1,0\n0.016667,0,1,0\n0.033333,0,1,0\n",
-            "0,0,1,0\n0.6,0,1,0\n",
-            "0,0,1,0\n0.1,5,1,0\n",
-            "0,0,1,0\n",
-        ] {
+        for text in
+            ["0,0,1,0\n0.016667,0,1,0\n0.033333,0,1,0\n", "0,0,1,0\n0.6,0,1,0\n", "0,0,1,0\n0.1,5,1,0\n", "0,0,1,0\n"]
+        {
             assert_eq!(filled(text), UserPath::parse(&format!("t,x,y,z\n{text}")).unwrap().points(), "{text}");
         }
     }

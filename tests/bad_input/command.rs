@@ -35,7 +35,9 @@ fn bad_files_leave_nothing_behind() {
     ] {
         // A second --model is wrong usage, so the bundle under test goes alone.
         let message = match args {
-            [agent, wav, "--model", model] => fails(1, &["generate", agent, wav, "--model", model, "--out", &text(&out)]),
+            [agent, wav, "--model", model] => {
+                fails(1, &["generate", agent, wav, "--model", model, "--out", &text(&out)])
+            }
             args => generate(1, &out, args),
         };
         assert!(message.starts_with(&format!("visavis: {file}: ")) && message.contains(part), "{message}");
