@@ -1,0 +1,8 @@
+use super::{Job, Tile, body};
+use half::f16;
+
+#[target_feature(enable = "neon")]
+pub(super) fn run(job: &Job<'_, f16>, tile: &mut Tile<f32>) {
+    job.check();
+    body(job, tile, f16::to_f32);
+}
