@@ -157,7 +157,7 @@ fn convolution(
 
 /// `x / 2 (1 + tanh(sqrt(2 / pi) (x + 0.044715 x^3)))`.
 fn gelu(model: &mut TypedModel, name: &str, x: OutletId) -> TractResult<OutletId> {
-    let mut number = |model: &mut TypedModel, what: &str, value: f32| {
+    let number = |model: &mut TypedModel, what: &str, value: f32| {
         model.add_const(format!("{name}.gelu.{what}"), Tensor::from_shape(&[1, 1], &[value])?)
     };
     let cubic = number(model, "cubic", 0.044_715)?;
