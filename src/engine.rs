@@ -1,1 +1,218 @@
-//! engine
+//! The engine: a loaded bundle, immutable, shared by any number of sessions.
+
+use crate::audio::{AudioEncoder, AudioWeights};
+use crate::bundle::{AudioSource, BundleFile, Tensors};
+use crate::config::Config;
+use crate::error::{Error, ErrorKind, Result};
+use crate::flow::{ConditionLayout, FlowNet};
+use crate::frame::{BLOCK_FRAMES, JOINT_CHANNELS, ROOT_CHANNELS};
+use crate::kernels::{Exec, Kernels, KvDtype, Limits};
+use crate::session::{Session, SessionOptions};
+use crate::vae::{Decoder, Encoder};
+use std::path::Path;
+use std::sync::Arc;
+
+/// A loaded model: networks packed for this CPU, rig and statistics. Immutable and shared; all that changes is in
+/// [`Session`].
+///
+/// ```no_run
+/// # fn main() -> visavis::error::Result<()> {
+/// use visavis::engine::Engine;
+/// use visavis::session::SessionOptions;
+///
+/// let engine = Engine::load("models/visavis-base.safetensors")?;
+/// let mut session = engine.session(SessionOptions::default())?;
+/// session.push_user_head(glam::Vec3::new(0.0, 1.6, 1.5), 0.0)?;
+/// while let Some(frames) = session.poll(0.0)? {
+///     println!("{} joints at {} s", frames[0].global.len(), frames[0].time);
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct Engine {
+    pub(crate) config: Config,
+    pub(crate) kernels: Kernels,
+    pub(crate) audio: AudioWeights,
+    #[cfg(feature = "tract")]
+    pub(crate) audio_source: AudioSource,
+    pub(crate) encoder: Encoder,
+    pub(crate) decoder: Decoder,
+    pub(crate) flow: FlowNet,
+    pub(crate) student: Option<FlowNet>,
+    pub(crate) pose: Standard,
+    pub(crate) latent: Standard,
+    /// Latents of the idle clip, `[blocks, latent]`, standardised.
+    pub(crate) idle: Vec<f32>,
+}
+
+/// Mean and standard deviation a channel.
+#[derive(Debug)]
+pub(crate) struct Standard {
+    pub(crate) mean: Vec<f32>,
+    pub(crate) std: Vec<f32>,
+}
+
+impl Engine {
+    /// Maps and loads the bundle at `path` with the best kernels of this CPU (or those of `VISAVIS_CPU`).
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`], [`ErrorKind::BundleCorrupt`], [`ErrorKind::BundleVersion`], [`ErrorKind::BundleInvalid`],
+    /// each naming the file; [`ErrorKind::CpuLevel`].
+    pub fn load(path: impl AsRef<Path>) -> Result<Arc<Self>> {
+        Self::from_file(&BundleFile::open(path)?, Kernels::detect()?)
+    }
+
+    /// Loads a bundle from memory; `name` stands for it in errors.
+    ///
+    /// # Errors
+    /// As [`Engine::load`].
+    pub fn from_bytes(bytes: Vec<u8>, name: &str) -> Result<Arc<Self>> {
+        Self::from_file(&BundleFile::from_bytes(bytes, name), Kernels::detect()?)
+    }
+
+    /// Loads an opened bundle for the given kernels.
+    ///
+    /// # Errors
+    /// As [`Engine::load`].
+    pub fn from_file(file: &BundleFile, kernels: Kernels) -> Result<Arc<Self>> {
+        let (config, tensors) = file.parse()?;
+        let engine = Self::build(config, &tensors, kernels).map_err(|e| e.with_path(file.path()))?;
+        Ok(Arc::new(engine))
+    }
+
+    fn build(config: Config, t: &Tensors<'_>, kernels: Kernels) -> Result<Self> {
+        let features = feature_width(&config);
+        let latent = config.vae.latent;
+        let layout = ConditionLayout { audio_features: config.audio.features };
+        let (idle_frames, idle) = t.f32_rows("idle.frames", features)?;
+        if idle_frames % BLOCK_FRAMES != 0 {
+            let message = format!("tensor idle.frames has {idle_frames} frames, not a multiple of {BLOCK_FRAMES}");
+            return Err(Error::new(ErrorKind::BundleInvalid, message));
+        }
+        let net = |prefix| FlowNet::load(t, kernels, &config.flow, latent, layout, prefix);
+        let audio_source = AudioSource::load(t, &config.audio)?;
+        let mut engine = Self {
+            audio: audio_source.pack(kernels, &config.audio)?,
+            encoder: Encoder::load(t, kernels, &config.vae, features)?,
+            decoder: Decoder::load(t, kernels, &config.vae, features)?,
+            flow: net("flow")?,
+            student: config.student.map(|_| net("student")).transpose()?,
+            pose: Standard::load(t, "stats.pose", features)?,
+            latent: Standard::load(t, "stats.latent", latent)?,
+            idle: Vec::new(),
+            #[cfg(feature = "tract")]
+            audio_source,
+            kernels,
+            config,
+        };
+        t.finish()?;
+        engine.idle = engine.encode(&idle)?;
+        Ok(engine)
+    }
+
+    /// Standardised latents `[n / 4, latent]` of `n` consecutive unstandardised feature vectors.
+    fn encode(&self, frames: &[f32]) -> Result<Vec<f32>> {
+        let (block, latent) = (BLOCK_FRAMES * self.features(), self.latent.mean.len());
+        let mut exec = self.exec(1)?;
+        let mut state = self.encoder.state(KvDtype::F32);
+        let mut latents = vec![0.0; frames.len() / block * latent];
+        let mut standardised = vec![0.0; block];
+        exec.begin();
+        for (frames, z) in frames.chunks_exact(block).zip(latents.chunks_exact_mut(latent)) {
+            self.pose.standardise(frames, &mut standardised);
+            self.encoder.step(&mut exec, &mut state, &standardised, z);
+            self.latent.standardise_in_place(z);
+        }
+        exec.end();
+        Ok(latents)
+    }
+
+    /// Starts a session; all memory that it will need is taken here.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] when an option is out of range or the bundle cannot do it.
+    pub fn session(self: &Arc<Self>, options: SessionOptions) -> Result<Session> {
+        Session::new(Arc::clone(self), options)
+    }
+
+    /// The bundle's configuration.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// The kernels that its weights are packed for.
+    pub fn kernels(&self) -> Kernels {
+        self.kernels
+    }
+
+    /// Bytes of packed weights that one evaluation of the flow network reads.
+    pub fn bytes_per_pass(&self) -> usize {
+        self.flow.bytes_per_pass()
+    }
+
+    /// Blocks of the idle clip, which are the first tokens of every session.
+    pub fn idle_blocks(&self) -> usize {
+        self.idle.len() / self.latent.mean.len()
+    }
+
+    /// Width of a pose feature vector.
+    pub(crate) fn features(&self) -> usize {
+        self.pose.mean.len()
+    }
+
+    /// Conditioning layout of the flow networks.
+    pub(crate) fn layout(&self) -> ConditionLayout {
+        ConditionLayout { audio_features: self.config.audio.features }
+    }
+
+    /// An executor with scratch for the widest operation of any of the networks.
+    pub(crate) fn exec(&self, threads: usize) -> Result<Exec> {
+        let c = &self.config;
+        let (rows, audio) = AudioEncoder::limits(&c.audio);
+        let flow = [c.flow.width * c.flow.mlp.max(6), c.flow.embed_user + 2 * c.flow.embed_voice + c.flow.embed_gaze + 4];
+        let rest = [c.vae.width * c.vae.mlp.max(3), self.features(), 4 * c.audio.features, c.vae.latent, c.flow.tau_width];
+        let width = flow.into_iter().chain(rest).fold(audio, usize::max);
+        Exec::new(self.kernels, threads, Limits { rows: rows.max(32), width })
+    }
+}
+
+/// Channels of a frame: the root's, then an icosahedron a joint.
+fn feature_width(config: &Config) -> usize {
+    ROOT_CHANNELS + JOINT_CHANNELS * config.rig.joints.len()
+}
+
+impl Standard {
+    fn load(t: &Tensors<'_>, name: &str, width: usize) -> Result<Self> {
+        let mean = t.f32(&format!("{name}_mean"), &[width])?;
+        let std = t.f32(&format!("{name}_std"), &[width])?;
+        if let Some(i) = std.iter().position(|s| *s <= 0.0) {
+            let message = format!("tensor {name}_std is {} at element {i}; standard deviations are positive", std[i]);
+            return Err(Error::new(ErrorKind::BundleInvalid, message));
+        }
+        Ok(Self { mean, std })
+    }
+
+    /// `(x - mean) / std`, row by row.
+    pub(crate) fn standardise(&self, x: &[f32], out: &mut [f32]) {
+        for (x, out) in x.chunks_exact(self.mean.len()).zip(out.chunks_exact_mut(self.mean.len())) {
+            out.copy_from_slice(x);
+            self.standardise_in_place(out);
+        }
+    }
+
+    pub(crate) fn standardise_in_place(&self, x: &mut [f32]) {
+        for ((x, m), s) in x.iter_mut().zip(&self.mean).zip(&self.std) {
+            *x = (*x - m) / s;
+        }
+    }
+
+    /// `x std + mean`, row by row, in place.
+    pub(crate) fn restore(&self, x: &mut [f32]) {
+        for row in x.chunks_exact_mut(self.mean.len()) {
+            for ((x, m), s) in row.iter_mut().zip(&self.mean).zip(&self.std) {
+                *x = *x * s + m;
+            }
+        }
+    }
+}

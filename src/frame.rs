@@ -1,5 +1,6 @@
 //! The types that pass between stages and to the caller.
 
+use crate::error::{Error, ErrorKind, Result};
 use glam::{Quat, Vec3};
 
 /// Frames of motion a second.
@@ -121,6 +122,50 @@ impl Frame {
             fit_error: 0.0,
             gaze: None,
             sampler: Sampler::Midpoint(4),
+        }
+    }
+}
+
+impl std::fmt::Display for Sampler {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Sampler::Midpoint(n) => write!(f, "midpoint{n}"),
+            Sampler::Euler(n) => write!(f, "euler:{n}"),
+            Sampler::Single => f.write_str("single"),
+        }
+    }
+}
+
+impl std::str::FromStr for Sampler {
+    type Err = Error;
+
+    /// Reads `midpoint4`, `midpoint2`, `midpoint1`, `euler:N` (1 to 64) or `single`.
+    fn from_str(s: &str) -> Result<Self> {
+        let wrong = || {
+            let message =
+                format!("unknown sampler {s:?}: midpoint4, midpoint2, midpoint1, euler:N (N 1 to 64) or single");
+            Error::new(ErrorKind::Argument, message)
+        };
+        match s {
+            "midpoint4" => Ok(Sampler::Midpoint(4)),
+            "midpoint2" => Ok(Sampler::Midpoint(2)),
+            "midpoint1" => Ok(Sampler::Midpoint(1)),
+            "single" => Ok(Sampler::Single),
+            _ => match s.strip_prefix("euler:").and_then(|n| n.parse().ok()) {
+                Some(n @ 1..=64) => Ok(Sampler::Euler(n)),
+                _ => Err(wrong()),
+            },
+        }
+    }
+}
+
+impl Sampler {
+    /// Evaluations of the flow network that a block takes.
+    pub fn evaluations(self) -> usize {
+        match self {
+            Sampler::Midpoint(n) => 2 * usize::from(n),
+            Sampler::Euler(n) => usize::from(n),
+            Sampler::Single => 1,
         }
     }
 }

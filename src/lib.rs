@@ -12,10 +12,12 @@ pub mod frame;
 pub mod kernels;
 pub mod metrics;
 pub mod nn;
+pub mod offline;
 #[allow(unsafe_code, reason = "the fork-join pool hands slices to its worker")]
 pub mod par;
 pub mod pose;
 pub mod recording;
 pub mod session;
+pub mod trace;
 pub mod user;
 pub mod vae;

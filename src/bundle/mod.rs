@@ -1,1 +1,18 @@
-//! bundle
+//! Bundles: one safetensors file that holds a model's weights and, in its metadata, its configuration.
+//!
+//! Opening a bundle checks everything before any of it is used: the container, the config's ranges, each tensor's name,
+//! dtype and shape, and that every number is finite. Sizes are bounded by the file's own before memory is taken.
+
+mod audio;
+mod check;
+mod contents;
+mod file;
+mod tensors;
+
+pub use audio::AudioSource;
+pub use contents::{Contents, TensorInfo};
+pub use file::BundleFile;
+pub use tensors::Tensors;
+
+/// Key of the config in the safetensors metadata.
+pub const CONFIG_KEY: &str = "visavis";

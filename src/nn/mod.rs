@@ -1,1 +1,9 @@
-//! nn
+//! What the causal transformers share: the pre-norm layer over a ring cache, and rotary phases.
+//!
+//! Mirrors `training/visavis_train/nets/layers.py`.
+
+mod layer;
+mod rope;
+
+pub use layer::{Layer, LayerNorms, Rows, Scratch};
+pub use rope::{Phases, Rope};

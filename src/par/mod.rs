@@ -1,1 +1,11 @@
-//! par
+//! Fork-join on one or two threads, for work of a few microseconds.
+//!
+//! [`Pool::run`] calls a function for each of `n` pieces: the caller takes them from the front and the helper thread, while it is
+//! awake, from the back, until they meet. The helper spins only between [`Pool::begin`] and [`Pool::end`] and is parked otherwise.
+//! Between those two nothing allocates, locks or enters the kernel. Waking and parking, which do, happen inside them.
+
+mod denormals;
+mod pool;
+
+pub use denormals::FlushToZero;
+pub use pool::Pool;

@@ -1,4 +1,22 @@
 //! Poses: the rig, icosahedra, and the way between feature vectors and joint transforms.
+//!
+//! A pose enters as one unstandardised feature vector `x` of `3 + 36 J` values (see [`Decoder`]), becomes a world
+//! transform of each joint ([`crate::frame::Frame::global`]) and, because decoded joints do not keep bone lengths
+//! exactly, a rotation of each joint on the rig that does ([`Fit`], [`crate::frame::Frame::local`]). The difference is
+//! reported in [`crate::frame::Frame::fit_error`]. [`Encoder`] is the way back.
+//!
+//! Everything is right-handed, metres, Y up; nothing here allocates once it is built.
 
+mod features;
+mod fit;
+mod gaze;
+mod humanoid;
+pub mod icosahedron;
 mod rig;
-pub use rig::{Joint, Rig};
+#[cfg(test)]
+pub(crate) mod synthetic;
+
+pub use features::{Decoder, Encoder, feature_count, root_of};
+pub use fit::Fit;
+pub use gaze::gaze_score;
+pub use rig::{Joint, MAX_JOINTS, Rig};

@@ -1,1 +1,234 @@
-//! session
+//! Sessions: one conversation with one user. The one place that knows all stages.
+//!
+//! ```text
+//! push audio, head -> inputs -> condition -> generator -> latent -> decoder -> features -> motion -> frames -> poll
+//! ```
+//!
+//! | file | what |
+//! |---|---|
+//! | `options` | what a session is made with |
+//! | `inputs` | voices and head positions to the conditioning of a block |
+//! | `block` | the computation of a block |
+//! | `anchor` | re-anchoring: encoding recent motion anew, spread over blocks |
+//! | `stats` | block times and counters |
+//! | `probe` | every stage of a block, for whoever wants to check the maths |
+//!
+//! After [`Session::poll`] has been called once, computing a block allocates nothing, takes no lock and makes no system
+//! call. The exceptions are outside the block: the first push of a voice, or a change of its rate, makes a resampler.
+
+mod anchor;
+mod block;
+mod inputs;
+mod options;
+mod probe;
+mod stats;
+
+pub use options::{Anchoring, SessionOptions};
+pub use probe::Probe;
+pub use stats::{Delays, InputStats, SessionStats};
+
+use crate::audio::Voice;
+use crate::engine::Engine;
+use crate::error::{Error, ErrorKind, Result};
+use crate::frame::{BLOCK_FRAMES, FPS, Frame, Sampler};
+use block::BlockState;
+use glam::Vec3;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// All mutable state of one conversation.
+///
+/// Time is the caller's: seconds since the session started, the same clock for [`Session::push_user_head`] and
+/// [`Session::poll`]. Audio has no timestamps: each voice is one continuous stream that starts at time 0.
+pub struct Session {
+    engine: Arc<Engine>,
+    options: SessionOptions,
+    state: BlockState,
+    now: f64,
+    times: stats::BlockTimes,
+}
+
+impl Session {
+    pub(crate) fn new(engine: Arc<Engine>, options: SessionOptions) -> Result<Self> {
+        options.check(&engine)?;
+        let state = BlockState::new(&engine, &options)?;
+        Ok(Self { engine, options, state, now: 0.0, times: stats::BlockTimes::new() })
+    }
+
+    /// Appends to the agent's own voice: mono samples, full scale 1, any rate from 8 to 192 kHz.
+    ///
+    /// The voice may come ahead of time (text-to-speech does) by up to a minute. Sound that has not come when a block is
+    /// computed is silence there, is counted, and is heard later. A voice that has never been pushed is absent,
+    /// which is not the same as silent.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Audio`] for a bad rate or samples that are not finite; nothing of the push is taken.
+    pub fn push_agent_audio(&mut self, samples: &[f32], rate: u32) -> Result<()> {
+        self.state.inputs.agent_voice().push(samples, rate)
+    }
+
+    /// Appends to the user's voice; as [`Session::push_agent_audio`].
+    ///
+    /// # Errors
+    /// As [`Session::push_agent_audio`].
+    pub fn push_user_audio(&mut self, samples: &[f32], rate: u32) -> Result<()> {
+        self.state.inputs.user_voice().push(samples, rate)
+    }
+
+    /// The agent's voice, to end an utterance, to break one off, or to set its presence.
+    pub fn agent_voice(&mut self) -> &mut Voice {
+        self.state.inputs.agent_voice()
+    }
+
+    /// The user's voice, likewise.
+    pub fn user_voice(&mut self) -> &mut Voice {
+        self.state.inputs.user_voice()
+    }
+
+    /// Tells where the user's head is (midpoint of the eyes), world metres, at `time` seconds of session time.
+    ///
+    /// Any rate; positions that are not finite, out of order, or impossible are ignored and counted (see
+    /// [`Session::stats`]).
+    ///
+    /// # Errors
+    /// None today; the result leaves room for typed refusals.
+    pub fn push_user_head(&mut self, position: Vec3, time: f64) -> Result<()> {
+        self.state.inputs.push_head(position, time);
+        Ok(())
+    }
+
+    /// Sets the gaze target, 0 (averted) to 1 (sustained eye contact), or `None` for what the model finds natural.
+    /// Takes effect with the next block.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] outside -1 to 1.
+    pub fn set_gaze(&mut self, target: Option<f32>) -> Result<()> {
+        options::check_gaze(target)?;
+        self.options.gaze = target;
+        Ok(())
+    }
+
+    /// Sets the guidance weights: of the conditioning as a whole (1 is none) and of the gaze target.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] outside 0 to 20.
+    pub fn set_guidance(&mut self, weight: f32, gaze: f32) -> Result<()> {
+        options::check_guidance(weight)?;
+        options::check_guidance(gaze)?;
+        (self.options.guidance, self.options.gaze_guidance) = (Some(weight), Some(gaze));
+        Ok(())
+    }
+
+    /// Sets the sampler from the next block on. Flow times that were not visited lately catch up in one batched pass.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] when this session has no slots, or the bundle no student, for it.
+    pub fn set_sampler(&mut self, sampler: Sampler) -> Result<()> {
+        if !self.state.supports(sampler) {
+            return Err(options::unsupported(sampler, &self.engine));
+        }
+        self.options.sampler = sampler;
+        Ok(())
+    }
+
+    /// The sampler that the next block will use.
+    pub fn sampler(&self) -> Sampler {
+        self.options.sampler
+    }
+
+    /// Computes the next block if it is due at `now` (session time, seconds) and returns its four frames, or `None`.
+    /// Call it until it returns `None`; a caller that comes late gets all blocks that it missed.
+    ///
+    /// Block `k` is due at `4 k / 30` s. It has heard and seen the user up to then, and the agent's voice through its
+    /// own four frames.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] for a time that is not finite, [`ErrorKind::State`] for one before an earlier call's.
+    pub fn poll(&mut self, now: f64) -> Result<Option<&[Frame]>> {
+        self.poll_with(now, None)
+    }
+
+    /// As [`Session::poll`], handing every stage of the block to `probe` as well.
+    ///
+    /// # Errors
+    /// As [`Session::poll`].
+    pub fn poll_with(&mut self, now: f64, probe: Option<&mut dyn Probe>) -> Result<Option<&[Frame]>> {
+        if !now.is_finite() {
+            return Err(Error::new(ErrorKind::Argument, format!("poll at {now}: pass seconds of session time")));
+        }
+        if now < self.now {
+            let message = format!("poll at {now} s after {} s: session time does not run backwards", self.now);
+            return Err(Error::new(ErrorKind::State, message));
+        }
+        self.now = now;
+        if now < self.next_due() - 1e-9 {
+            return Ok(None);
+        }
+        let started = Instant::now();
+        self.state.begin();
+        let done = self.state.compute(&self.engine, &self.options, probe);
+        self.state.end();
+        self.times.record(started.elapsed());
+        done?;
+        Ok(Some(&self.state.frames))
+    }
+
+    /// Session time at which the next block is due, seconds.
+    pub fn next_due(&self) -> f64 {
+        (self.state.block * BLOCK_FRAMES as u64) as f64 / f64::from(FPS)
+    }
+
+    /// Starts anew, as if just made with the current options: same seed, same bits. Time starts at 0 again.
+    ///
+    /// # Errors
+    /// None that the session's creation would not have met.
+    pub fn reset(&mut self) -> Result<()> {
+        self.now = 0.0;
+        self.times.clear();
+        self.state.reset(&self.engine, &self.options)
+    }
+
+    /// Replaces the seeded noise of the coming tokens: `noise` holds `[tokens, latent]` values, for the idle clip's
+    /// tokens first. Starts the session anew. For parity checks against other implementations.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] when there are fewer tokens than the idle clip has.
+    pub fn reset_with_noise(&mut self, noise: Vec<f32>) -> Result<()> {
+        let latent = self.engine.config.vae.latent;
+        if noise.len() < self.engine.idle.len() || noise.len() % latent != 0 {
+            let message = format!("noise of {} values: whole tokens of {latent}, idle clip included", noise.len());
+            return Err(Error::new(ErrorKind::Argument, message));
+        }
+        self.state.noise = block::Noise::Given(noise);
+        self.reset()
+    }
+
+    /// Block times, delays and counters so far.
+    pub fn stats(&self) -> SessionStats {
+        SessionStats {
+            blocks: self.state.block,
+            block_ms: self.times.percentiles(),
+            delays: self.state.inputs.delays(&self.engine.config),
+            inputs: self.state.inputs.stats(),
+            anchorings: self.state.anchor.count(),
+            cache_bytes: self.state.cache_bytes(),
+        }
+    }
+
+    /// The engine that this session runs on.
+    pub fn engine(&self) -> &Arc<Engine> {
+        &self.engine
+    }
+
+    /// Current options.
+    pub fn options(&self) -> &SessionOptions {
+        &self.options
+    }
+}
+
+impl std::fmt::Debug for Session {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let name = &self.engine.config.name;
+        f.debug_struct("Session").field("model", name).field("blocks", &self.state.block).finish_non_exhaustive()
+    }
+}

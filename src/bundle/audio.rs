@@ -1,0 +1,76 @@
+//! The audio encoder's weights as a bundle holds them.
+
+use super::Tensors;
+use crate::audio::{AudioWeights, LayerWeights};
+use crate::config::AudioConfig;
+use crate::error::Result;
+use crate::kernels::{Kernels, WeightData, Weights};
+
+/// Weights and biases of the audio encoder in plain f32; what both backends are made from.
+#[derive(Debug)]
+pub struct AudioSource {
+    layers: Vec<Plain>,
+    out: Plain,
+}
+
+#[derive(Debug)]
+struct Plain {
+    rows: usize,
+    cols: usize,
+    weight: Vec<f32>,
+    bias: Vec<f32>,
+}
+
+impl AudioSource {
+    /// Reads `audio.conv.*` (`[outputs, kernel, inputs]`) and `audio.out` (`[features, last]`).
+    ///
+    /// # Errors
+    /// As [`Tensors::f32`].
+    pub fn load(t: &Tensors<'_>, config: &AudioConfig) -> Result<Self> {
+        let conv = |(i, c): (usize, &crate::config::ConvConfig)| {
+            Plain::load(t, &format!("audio.conv.{i}"), &[c.outputs, c.kernel, c.inputs])
+        };
+        let last = config.layers.last().map_or(1, |c| c.outputs);
+        Ok(Self {
+            layers: config.layers.iter().enumerate().map(conv).collect::<Result<_>>()?,
+            out: Plain::load(t, "audio.out", &[config.features, last])?,
+        })
+    }
+
+    /// Packs the weights for our kernels.
+    ///
+    /// # Errors
+    /// As [`AudioWeights::new`].
+    pub fn pack(&self, kernels: Kernels, config: &AudioConfig) -> Result<AudioWeights> {
+        AudioWeights::new(&kernels, config, &self.borrow(), self.out.borrow())
+    }
+
+    /// Builds the network on tract.
+    ///
+    /// # Errors
+    /// As [`crate::audio::TractEncoder::new`].
+    #[cfg(feature = "tract")]
+    pub fn tract(&self, config: &AudioConfig) -> Result<crate::audio::TractEncoder> {
+        crate::audio::TractEncoder::new(config, &self.borrow(), self.out.borrow())
+    }
+
+    fn borrow(&self) -> Vec<LayerWeights<'_>> {
+        self.layers.iter().map(Plain::borrow).collect()
+    }
+}
+
+impl Plain {
+    fn load(t: &Tensors<'_>, name: &str, shape: &[usize]) -> Result<Self> {
+        Ok(Self {
+            rows: shape[0],
+            cols: shape[1..].iter().product(),
+            weight: t.f32(&format!("{name}.weight"), shape)?,
+            bias: t.f32(&format!("{name}.bias"), &shape[..1])?,
+        })
+    }
+
+    fn borrow(&self) -> LayerWeights<'_> {
+        let weights = Weights { rows: self.rows, cols: self.cols, data: WeightData::F32(&self.weight) };
+        LayerWeights { weights, bias: &self.bias }
+    }
+}

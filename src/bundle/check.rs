@@ -1,0 +1,76 @@
+//! Ranges of a config. They bound what an engine allocates before any tensor has been looked at.
+
+use super::file::invalid;
+use crate::audio::check_audio_config;
+use crate::config::Config;
+use crate::error::Result;
+
+/// Checks every number of `config` against its range.
+pub(super) fn config(c: &Config) -> Result<()> {
+    within("user_delay_blocks", c.user_delay_blocks as usize, 1, 4)?;
+    within("agent_delay_blocks", c.agent_delay_blocks as usize, 0, 4)?;
+    c.rig.check()?;
+    real("pose.radius", c.pose.radius, 0.001, 10.0)?;
+
+    within("audio.layers", c.audio.layers.len(), 1, 32)?;
+    check_audio_config(&c.audio)?;
+
+    let v = &c.vae;
+    within("vae.layers", v.layers, 1, 64)?;
+    width("vae.width", v.width, v.heads)?;
+    within("vae.mlp", v.mlp, 1, 16)?;
+    within("vae.latent", v.latent, 1, 4096)?;
+    within("vae.window_blocks", v.window_blocks, 1, 1024)?;
+
+    let w = &c.flow;
+    within("flow.layers", w.layers, 1, 64)?;
+    width("flow.width", w.width, w.heads)?;
+    within("flow.mlp", w.mlp, 1, 16)?;
+    within("flow.tau_width", w.tau_width, 2, 4096)?;
+    if w.tau_width % 2 != 0 {
+        return Err(invalid("flow.tau_width must be even: half cosines, half sines"));
+    }
+    within("flow.window_blocks", w.window_blocks, 2, 1024)?;
+    let embeds = [
+        ("flow.embed_latent", w.embed_latent),
+        ("flow.embed_user", w.embed_user),
+        ("flow.embed_voice", w.embed_voice),
+        ("flow.embed_gaze", w.embed_gaze),
+    ];
+    for (name, value) in embeds {
+        within(name, value, 1, 4096)?;
+    }
+    real("flow.user_scale", w.user_scale, 0.001, 1000.0)?;
+    if let Some(s) = &c.student {
+        real("student.tau_history", s.tau_history, 0.0, 1.0)?;
+        real("student.guidance", s.guidance, 0.0, 20.0)?;
+        real("student.gaze_guidance", s.gaze_guidance, 0.0, 20.0)?;
+    }
+    real("session.guidance", c.session.guidance, 0.0, 20.0)?;
+    real("session.gaze_guidance", c.session.gaze_guidance, 0.0, 20.0)?;
+    within("session.anchor_period", c.session.anchor_period as usize, 0, 1 << 20)?;
+    real("session.anchor_radius", c.session.anchor_radius, 0.1, 1e6)
+}
+
+fn width(name: &str, width: usize, heads: usize) -> Result<()> {
+    within(name, width, 2, 8192)?;
+    within(&name.replace("width", "heads"), heads, 1, 128)?;
+    if width % heads != 0 || (width / heads) % 2 != 0 {
+        return Err(invalid(format!("{name} is {width}: it must be an even multiple of its {heads} heads")));
+    }
+    Ok(())
+}
+
+fn within(name: &str, value: usize, low: usize, high: usize) -> Result<()> {
+    if (low..=high).contains(&value) {
+        return Ok(());
+    }
+    Err(invalid(format!("the config's {name} is {value}, outside {low} to {high}; export the bundle again")))
+}
+
+fn real(name: &str, value: f32, low: f32, high: f32) -> Result<()> {
+    if (low..=high).contains(&value) {
+        return Ok(());
+    }
+    Err(invalid(format!("the config's {name} is {value}, outside {low} to {high}; export the bundle again")))
+}

@@ -1,0 +1,130 @@
+//! The bytes of a bundle, from a mapped file or from memory.
+
+use super::{CONFIG_KEY, Tensors, check};
+use crate::config::{Config, FORMAT};
+use crate::error::{Error, ErrorKind, Result};
+use memmap2::Mmap;
+use safetensors::SafeTensors;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// Largest header that is parsed, bytes: metadata of thousands of tensors take well under one mebibyte.
+const MAX_HEADER: u64 = 16 << 20;
+
+/// An opened bundle: its bytes, with the container already checked.
+#[derive(Debug)]
+pub struct BundleFile {
+    bytes: Bytes,
+    path: PathBuf,
+}
+
+#[derive(Debug)]
+enum Bytes {
+    Mapped(Mmap),
+    Owned(Vec<u8>),
+}
+
+impl BundleFile {
+    /// Maps the file at `path`.
+    ///
+    /// The file must not be changed or truncated while an engine is being loaded from it; afterwards it is not read
+    /// again. [`BundleFile::from_bytes`] has no such condition.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`] when it cannot be opened or mapped.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let io = |e| Error::io("open the bundle", path, e);
+        let file = File::open(path).map_err(io)?;
+        if file.metadata().map_err(io)?.len() == 0 {
+            return Err(corrupt("the file is empty; fetch the bundle again").with_path(path));
+        }
+        #[allow(unsafe_code, reason = "mapping a file is unsafe by nature")]
+        // SAFETY: the map is read-only and private. Should another process change the file while it is being read,
+        // the reader may see changed numbers (they are checked after copying) or, if the file shrinks, a bus error:
+        // the condition stated above.
+        let map = unsafe { Mmap::map(&file) }.map_err(io)?;
+        Ok(Self { bytes: Bytes::Mapped(map), path: path.to_path_buf() })
+    }
+
+    /// Takes a bundle that is already in memory; `name` stands for it in errors.
+    pub fn from_bytes(bytes: Vec<u8>, name: impl Into<PathBuf>) -> Self {
+        Self { bytes: Bytes::Owned(bytes), path: name.into() }
+    }
+
+    /// The file's path, or the name given to [`BundleFile::from_bytes`].
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Size in bytes.
+    pub fn len(&self) -> usize {
+        self.as_slice().len()
+    }
+
+    /// Whether there are no bytes at all.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    fn as_slice(&self) -> &[u8] {
+        match &self.bytes {
+            Bytes::Mapped(map) => map,
+            Bytes::Owned(bytes) => bytes,
+        }
+    }
+
+    /// Parses the container and the config, and checks both.
+    ///
+    /// # Errors
+    /// [`ErrorKind::BundleCorrupt`], [`ErrorKind::BundleVersion`] or [`ErrorKind::BundleInvalid`], naming the file.
+    pub fn parse(&self) -> Result<(Config, Tensors<'_>)> {
+        self.parse_inner().map_err(|e| e.with_path(&self.path))
+    }
+
+    fn parse_inner(&self) -> Result<(Config, Tensors<'_>)> {
+        let bytes = self.as_slice();
+        let header = bytes.first_chunk::<8>().map(|b| u64::from_le_bytes(*b));
+        match header {
+            None => return Err(corrupt("shorter than a safetensors header; fetch the bundle again")),
+            Some(n) if n > MAX_HEADER || n > bytes.len() as u64 => {
+                return Err(corrupt("not a safetensors file, or cut off inside its header; fetch the bundle again"));
+            }
+            Some(_) => {}
+        }
+        let container = |e| corrupt(format!("damaged safetensors container ({e}); fetch the bundle again"));
+        let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(container)?;
+        let tensors = SafeTensors::deserialize(bytes).map_err(container)?;
+        let json = metadata.metadata().as_ref().and_then(|m| m.get(CONFIG_KEY)).ok_or_else(|| {
+            invalid(format!("a safetensors file, but not a Visavis bundle: its metadata has no \"{CONFIG_KEY}\" entry"))
+        })?;
+        let config = parse_config(json)?;
+        check::config(&config)?;
+        Ok((config, Tensors::new(tensors)))
+    }
+}
+
+fn parse_config(json: &str) -> Result<Config> {
+    #[derive(serde::Deserialize)]
+    struct Version {
+        format: u32,
+    }
+    let unreadable = |e| invalid(format!("the bundle's config cannot be read: {e}; export the bundle again"));
+    let version: Version = serde_json::from_str(json).map_err(unreadable)?;
+    if version.format != FORMAT {
+        let advice = if version.format > FORMAT { "update visavis" } else { "export the bundle again" };
+        return Err(Error::new(
+            ErrorKind::BundleVersion,
+            format!("bundle format {}, but this build reads format {FORMAT}; {advice}", version.format),
+        ));
+    }
+    serde_json::from_str(json).map_err(unreadable)
+}
+
+fn corrupt(message: impl Into<String>) -> Error {
+    Error::new(ErrorKind::BundleCorrupt, message)
+}
+
+pub(super) fn invalid(message: impl Into<String>) -> Error {
+    Error::new(ErrorKind::BundleInvalid, message)
+}

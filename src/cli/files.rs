@@ -1,0 +1,37 @@
+//! Where the files that come with the program are.
+
+use std::path::{Path, PathBuf};
+use visavis::error::{Error, ErrorKind, Result};
+
+/// The shipped bundle.
+const MODEL: &str = "models/visavis-base.safetensors";
+
+/// The bundle to use: `given`, else the shipped one.
+pub fn model(given: Option<&Path>) -> Result<PathBuf> {
+    match given {
+        Some(path) => Ok(path.to_path_buf()),
+        None => shipped(MODEL).map_err(|tried| missing("the model", &tried, "; or name a bundle with --model")),
+    }
+}
+
+/// A file of the sample conversation.
+pub fn sample(name: &str) -> Result<PathBuf> {
+    shipped(&format!("samples/{name}")).map_err(|tried| missing("the sample conversation", &tried, ""))
+}
+
+/// Looks for `relative` in the current folder, beside the program, and where the program was built; else what was tried.
+fn shipped(relative: &str) -> Result<PathBuf, Vec<PathBuf>> {
+    let beside = std::env::current_exe().ok().and_then(|exe| Some(exe.parent()?.join(relative)));
+    let tried = [Some(PathBuf::from(relative)), beside, Some(Path::new(env!("CARGO_MANIFEST_DIR")).join(relative))];
+    let tried: Vec<_> = tried.into_iter().flatten().collect();
+    tried.iter().find(|path| path.exists()).cloned().ok_or(tried)
+}
+
+fn missing(what: &str, tried: &[PathBuf], advice: &str) -> Error {
+    let list: Vec<_> = tried.iter().map(|path| path.display().to_string()).collect();
+    let message = format!(
+        "{what} is not there (tried {}); run visavis in its repository, or copy the file there{advice}",
+        list.join(", ")
+    );
+    Error::new(ErrorKind::Io, message)
+}

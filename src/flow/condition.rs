@@ -1,0 +1,102 @@
+//! What a token is told.
+
+/// Where each modality lies in a [`Condition`]'s values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ConditionLayout {
+    /// Width of the audio features of one frame.
+    pub audio_features: usize,
+}
+
+impl ConditionLayout {
+    const USER: usize = 8;
+    const GAZE: usize = 4;
+
+    /// Number of values: 4 x 2 user positions, 4 frames of features of each voice, 4 gaze scores.
+    pub fn width(&self) -> usize {
+        Self::USER + 8 * self.audio_features + Self::GAZE
+    }
+
+    pub(super) fn user(&self) -> std::ops::Range<usize> {
+        0..Self::USER
+    }
+
+    pub(super) fn agent_voice(&self) -> std::ops::Range<usize> {
+        Self::USER..Self::USER + 4 * self.audio_features
+    }
+
+    pub(super) fn user_voice(&self) -> std::ops::Range<usize> {
+        let start = Self::USER + 4 * self.audio_features;
+        start..start + 4 * self.audio_features
+    }
+
+    pub(super) fn gaze(&self) -> std::ops::Range<usize> {
+        self.width() - Self::GAZE..self.width()
+    }
+}
+
+/// Conditioning of one token (one block). A modality that is absent has its flag off; its values are not looked at.
+///
+/// This is the seam of the generator: whatever produces motion takes a `Condition` a block.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Condition {
+    layout: ConditionLayout,
+    pub(super) values: Vec<f32>,
+    /// Presence of the user's position, the agent's voice, the user's voice and the gaze target.
+    pub(super) present: [bool; 4],
+}
+
+impl Condition {
+    /// Everything absent.
+    pub fn absent(layout: ConditionLayout) -> Self {
+        Self { layout, values: vec![0.0; layout.width()], present: [false; 4] }
+    }
+
+    /// Makes everything absent again.
+    pub fn clear(&mut self) {
+        self.present = [false; 4];
+    }
+
+    /// The user's floor positions `(x, z)` over four frames in the agent's frame, metres.
+    pub fn set_user(&mut self, positions: &[f32; 8]) {
+        self.values[self.layout.user()].copy_from_slice(positions);
+        self.present[0] = true;
+    }
+
+    /// Features of the agent's voice, `[4, audio_features]`.
+    pub fn set_agent_voice(&mut self, features: &[f32]) {
+        self.values[self.layout.agent_voice()].copy_from_slice(features);
+        self.present[1] = true;
+    }
+
+    /// Features of the user's voice, `[4, audio_features]`.
+    pub fn set_user_voice(&mut self, features: &[f32]) {
+        self.values[self.layout.user_voice()].copy_from_slice(features);
+        self.present[2] = true;
+    }
+
+    /// Gaze target, -1 to 1, the same for the four frames.
+    pub fn set_gaze(&mut self, target: f32) {
+        self.values[self.layout.gaze()].fill(target);
+        self.present[3] = true;
+    }
+
+    /// Whether a gaze target is present.
+    pub fn has_gaze(&self) -> bool {
+        self.present[3]
+    }
+
+    /// The user's positions as given, when present.
+    pub fn user(&self) -> Option<&[f32]> {
+        self.present[0].then(|| &self.values[self.layout.user()])
+    }
+
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        debug_assert_eq!(self.layout, other.layout);
+        self.values.copy_from_slice(&other.values);
+        self.present = other.present;
+    }
+
+    pub(super) fn layout(&self) -> ConditionLayout {
+        self.layout
+    }
+}

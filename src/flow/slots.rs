@@ -1,0 +1,282 @@
+//! One key-value cache a flow time, and the passes that fill and use them.
+//!
+//! Rings are numbered `(slot * branches + branch) * layers + layer`. Position `t` of a ring holds token `t`. A pass
+//! writes the new token's keys and values too; they are provisional, and the next pass over that position, when the
+//! token is finished, overwrites them.
+
+use super::history::History;
+use super::network::{FlowNet, Modulation};
+use crate::kernels::{Epilogue, Exec, KvCache, KvDtype};
+use crate::nn::{Phases, Rows, Scratch};
+use std::ops::Range;
+
+/// Finished tokens that one pass commits at most.
+pub(super) const CHUNK: u64 = 8;
+
+/// Guidance branches that a network is run with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Branches {
+    /// Unconditional, conditional without the gaze target, and conditional with it.
+    Guided,
+    /// Conditional alone, gaze target included when set: guidance is distilled into the weights.
+    Baked,
+}
+
+impl Branches {
+    /// Number of branches.
+    pub fn count(self) -> usize {
+        match self {
+            Branches::Guided => 3,
+            Branches::Baked => 1,
+        }
+    }
+}
+
+/// Branch numbers of [`Branches::Guided`].
+pub(super) const UNCONDITIONAL: usize = 0;
+pub(super) const NO_GAZE: usize = 1;
+pub(super) const GAZE: usize = 2;
+
+/// A slot: the flow times at which its history and its new token are seen, and how far its cache is filled.
+#[derive(Debug, Clone, Copy)]
+struct Slot {
+    tau_history: f32,
+    /// Tokens before this are in the cache.
+    committed: u64,
+    /// Tokens from this on are in the cache without a gap.
+    start: u64,
+}
+
+/// The slots of one network and all memory that its passes need.
+#[derive(Debug)]
+pub struct Slots {
+    branches: Branches,
+    slots: Vec<Slot>,
+    modulation: Modulation,
+    cache: KvCache,
+    layers: usize,
+    window: u64,
+    /// Projected conditioning of the last tokens, `[token % capacity][2][d]`.
+    projected: Vec<f32>,
+    projected_capacity: u64,
+    projected_end: u64,
+    embedded: Vec<f32>,
+    rows: Rows,
+    mod_index: Vec<u32>,
+    phases: Phases,
+    scratch: Scratch,
+    z: Vec<f32>,
+    z_in: Vec<f32>,
+    x: Vec<f32>,
+    tail: Vec<f32>,
+    x1: Vec<f32>,
+}
+
+impl Slots {
+    /// Slots for pairs `(history, new token)` of flow times.
+    pub fn new(exec: &mut Exec, net: &FlowNet, taus: &[(f32, f32)], branches: Branches, dtype: KvDtype) -> Self {
+        let c = net.config();
+        let (d, latent, window) = (c.width, net.latent(), c.window_blocks as u64);
+        let rows = (CHUNK as usize + 1) * branches.count();
+        let capacity = window + CHUNK;
+        let all: Vec<f32> = taus.iter().flat_map(|(h, n)| [*h, *n]).collect();
+        Self {
+            branches,
+            slots: taus.iter().map(|(h, _)| Slot { tau_history: *h, committed: 0, start: 0 }).collect(),
+            modulation: net.modulation(exec, &all),
+            cache: KvCache::new(taus.len() * branches.count() * c.layers, capacity as usize, d, dtype),
+            layers: c.layers,
+            window,
+            projected: vec![0.0; (capacity as usize + 1) * 2 * d],
+            projected_capacity: capacity + 1,
+            projected_end: 0,
+            embedded: vec![0.0; 2 * net.rest_width()],
+            rows: Rows::with_capacity(rows),
+            mod_index: Vec::with_capacity(rows),
+            phases: net.rope.phases(rows),
+            scratch: Scratch::new(rows, d, d * c.mlp),
+            z: vec![0.0; (CHUNK as usize + 1) * latent],
+            z_in: vec![0.0; (CHUNK as usize + 1) * d],
+            x: vec![0.0; rows * d],
+            tail: vec![0.0; branches.count() * d],
+            x1: vec![0.0; branches.count() * latent],
+        }
+    }
+
+    /// Forgets all tokens.
+    pub fn reset(&mut self) {
+        self.projected_end = 0;
+        self.slots.iter_mut().for_each(|s| (s.committed, s.start) = (0, 0));
+    }
+
+    /// Bytes of the caches.
+    pub fn cache_bytes(&self) -> usize {
+        self.cache.bytes()
+    }
+
+    /// Number of slots.
+    pub fn len(&self) -> usize {
+        self.slots.len()
+    }
+
+    /// Whether there are no slots.
+    pub fn is_empty(&self) -> bool {
+        self.slots.is_empty()
+    }
+
+    /// Brings slot `slot` up to the finished tokens of `history`.
+    pub fn catch_up(&mut self, exec: &mut Exec, net: &FlowNet, history: &History, slot: usize) {
+        let end = history.len();
+        while self.pending(slot, end) > 0 {
+            let first = self.slots[slot].committed;
+            self.pass(exec, net, history, slot, first..end.min(first + CHUNK), None);
+        }
+    }
+
+    /// Forgets what slot `slot` holds and fills it again from the last `window` tokens of `history`.
+    pub fn refill(&mut self, exec: &mut Exec, net: &FlowNet, history: &History, slot: usize) {
+        let start = history.len().saturating_sub(self.window);
+        (self.slots[slot].start, self.slots[slot].committed) = (start, start);
+        self.catch_up(exec, net, history, slot);
+    }
+
+    /// x1 predictions for the new token at `z`, `[branches, latent]`, over the history that slot `slot` holds; what the
+    /// slot lacks is caught up first. Without a gaze target the gaze branch equals the one without.
+    pub fn evaluate(&mut self, exec: &mut Exec, net: &FlowNet, history: &History, slot: usize, z: &[f32]) -> &[f32] {
+        let end = history.len();
+        while self.pending(slot, end) > CHUNK {
+            let first = self.slots[slot].committed;
+            self.pass(exec, net, history, slot, first..first + CHUNK, None);
+        }
+        let first = self.slots[slot].committed;
+        self.pass(exec, net, history, slot, first..end, Some(z));
+        &self.x1
+    }
+
+    /// Tokens that slot `slot` lacks. One that lags by more than a window starts anew a window back.
+    fn pending(&mut self, slot: usize, end: u64) -> u64 {
+        let oldest = end.saturating_sub(self.window);
+        let s = &mut self.slots[slot];
+        if s.committed < oldest {
+            (s.start, s.committed) = (oldest, oldest);
+        }
+        end - s.committed
+    }
+
+    /// Runs tokens `commit` (finished; at most [`CHUNK`]) and, with `new`, the token being made.
+    fn pass(
+        &mut self,
+        exec: &mut Exec,
+        net: &FlowNet,
+        history: &History,
+        slot: usize,
+        commit: Range<u64>,
+        new: Option<&[f32]>,
+    ) {
+        let (d, latent) = (net.config().width, net.latent());
+        let tau = self.slots[slot].tau_history;
+        let tokens = commit.start..commit.end + u64::from(new.is_some());
+        let count = (tokens.end - tokens.start) as usize;
+        for token in tokens.clone() {
+            self.project(exec, net, history, token);
+            let z = &mut self.z[(token - tokens.start) as usize * latent..][..latent];
+            match new {
+                Some(z_new) if token == commit.end => z.copy_from_slice(z_new),
+                _ => impute(tau, history.z(token), history.eps(token), z),
+            }
+        }
+        net.embed_latent(exec, &self.z[..count * latent], count, &mut self.z_in[..count * d]);
+
+        self.rows.clear();
+        self.mod_index.clear();
+        let start = self.slots[slot].start;
+        for token in tokens.clone() {
+            let is_new = token == commit.end;
+            for branch in self.active(history, token) {
+                let row = self.rows.len();
+                let first = (token + 1).saturating_sub(self.window).max(start);
+                self.rows.push(self.ring(slot, branch), token, first);
+                self.mod_index.push((2 * slot + usize::from(is_new)) as u32);
+                net.rope.fill(&mut self.phases, row, token);
+                let projected = &self.projected[self.projected_at(token, d)..][..2 * d];
+                let conditioning = match (self.branches, branch) {
+                    (Branches::Guided, UNCONDITIONAL) => net.unconditional(),
+                    (Branches::Guided, NO_GAZE) => &projected[..d],
+                    _ => &projected[d..],
+                };
+                let z_in = &self.z_in[(token - tokens.start) as usize * d..][..d];
+                let x = &mut self.x[row * d..][..d];
+                x.iter_mut().zip(z_in).zip(conditioning).for_each(|((x, a), b)| *x = a + b);
+            }
+        }
+
+        for (i, layer) in net.layers.iter().enumerate() {
+            let norms = self.modulation.layer(i, &self.mod_index);
+            let heads = net.config().heads;
+            let (cache, rows) = (&mut self.cache, &mut self.rows);
+            layer.run(exec, i, heads, norms, &self.phases, cache, rows, &mut self.scratch, &mut self.x);
+        }
+        for token in tokens {
+            self.mirror_gaze_branch(history, slot, token);
+        }
+        self.slots[slot].committed = commit.end;
+        if new.is_some() {
+            self.read_out(exec, net, history.condition(commit.end).has_gaze());
+        }
+    }
+
+    /// Branches that are run for `token`: the gaze branch only where there is a target.
+    fn active(&self, history: &History, token: u64) -> Range<usize> {
+        match self.branches {
+            Branches::Baked => 0..1,
+            Branches::Guided if history.condition(token).has_gaze() => 0..3,
+            Branches::Guided => 0..2,
+        }
+    }
+
+    /// A token without a gaze target is the same in both conditional branches: copies its keys and values.
+    fn mirror_gaze_branch(&mut self, history: &History, slot: usize, token: u64) {
+        if self.branches == Branches::Guided && !history.condition(token).has_gaze() {
+            let (from, to) = (self.ring(slot, NO_GAZE), self.ring(slot, GAZE));
+            (0..self.layers).for_each(|layer| self.cache.copy_token(from + layer, to + layer, token));
+        }
+    }
+
+    /// Final norm and projection of the new token's rows, which are the last ones of the pass.
+    fn read_out(&mut self, exec: &mut Exec, net: &FlowNet, gaze: bool) {
+        let (d, latent, rows) = (net.config().width, net.latent(), self.rows.len());
+        let n = if self.branches == Branches::Guided && !gaze { 2 } else { self.branches.count() };
+        let index = &self.mod_index[rows - n..];
+        let (shift, scale) = self.modulation.last(index);
+        exec.norm(&self.x[(rows - n) * d..rows * d], n, d, shift, scale, &mut self.tail[..n * d]);
+        exec.linear(&net.out, &self.tail[..n * d], n, &mut self.x1[..n * latent], Epilogue::Store);
+        if n == 2 {
+            self.x1.copy_within(NO_GAZE * latent..(NO_GAZE + 1) * latent, GAZE * latent);
+        }
+    }
+
+    /// Projects the conditioning of `token` unless it has been; tokens come in order.
+    fn project(&mut self, exec: &mut Exec, net: &FlowNet, history: &History, token: u64) {
+        if token < self.projected_end && token + self.projected_capacity > self.projected_end {
+            return;
+        }
+        let (d, at) = (net.config().width, self.projected_at(token, net.config().width));
+        net.project(exec, history.condition(token), &mut self.embedded, &mut self.projected[at..][..2 * d]);
+        self.projected_end = token + 1;
+    }
+
+    fn projected_at(&self, token: u64, d: usize) -> usize {
+        (token % self.projected_capacity) as usize * 2 * d
+    }
+
+    fn ring(&self, slot: usize, branch: usize) -> usize {
+        (slot * self.branches.count() + branch) * self.layers
+    }
+}
+
+/// `z^tau = tau z + (1 - tau) eps` (SARAH eq. 4).
+fn impute(tau: f32, z: &[f32], eps: &[f32], out: &mut [f32]) {
+    for ((o, z), e) in out.iter_mut().zip(z).zip(eps) {
+        *o = tau * z + (1.0 - tau) * e;
+    }
+}

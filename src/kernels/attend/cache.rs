@@ -1,0 +1,134 @@
+//! The key and value cache: rings of tokens, allocated once.
+
+use half::f16;
+use half::slice::HalfFloatSliceExt;
+
+/// How keys and values are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum KvDtype {
+    /// Half floats: the default of a session.
+    F16,
+    /// Floats: the reference.
+    F32,
+}
+
+/// Tokens `first .. first + len` of one ring: what one row attends to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Span {
+    /// Which ring.
+    pub ring: u32,
+    /// Position of the first token; a token of position p lies at p modulo the ring's capacity.
+    pub first: u64,
+    /// Number of tokens, at most the ring's capacity; a row with none gets zeros.
+    pub len: u32,
+}
+
+/// `rings` rings of `capacity` tokens, each a key and a value row of `dim` values.
+///
+/// A ring keeps the last `capacity` positions written to it; whoever reads a span knows that its tokens are still there.
+pub struct KvCache {
+    rings: usize,
+    pub(crate) capacity: usize,
+    pub(crate) dim: usize,
+    pub(crate) store: Store,
+}
+
+/// Keys, then values.
+pub(crate) enum Store {
+    F16(Vec<f16>, Vec<f16>),
+    F32(Vec<f32>, Vec<f32>),
+}
+
+impl KvCache {
+    /// Allocates the cache, zeroed.
+    ///
+    /// # Panics
+    /// When `capacity` or `dim` is 0.
+    pub fn new(rings: usize, capacity: usize, dim: usize, dtype: KvDtype) -> Self {
+        assert!(capacity > 0 && dim > 0, "a ring holds at least one token of at least one value");
+        let n = rings * capacity * dim;
+        let store = match dtype {
+            KvDtype::F16 => Store::F16(vec![f16::ZERO; n], vec![f16::ZERO; n]),
+            KvDtype::F32 => Store::F32(vec![0.0; n], vec![0.0; n]),
+        };
+        Self { rings, capacity, dim, store }
+    }
+
+    /// Writes the key and value of `position` into a ring; f16 storage rounds to nearest even.
+    ///
+    /// # Panics
+    /// When the ring does not exist, or `k` or `v` are not `dim` long.
+    pub fn write(&mut self, ring: usize, position: u64, k: &[f32], v: &[f32]) {
+        assert!(k.len() == self.dim && v.len() == self.dim, "a token's key and value have dim values");
+        let at = self.at(ring, position);
+        let dim = self.dim;
+        match &mut self.store {
+            Store::F16(keys, values) => {
+                keys[at..at + dim].convert_from_f32_slice(k);
+                values[at..at + dim].convert_from_f32_slice(v);
+            }
+            Store::F32(keys, values) => {
+                keys[at..at + dim].copy_from_slice(k);
+                values[at..at + dim].copy_from_slice(v);
+            }
+        }
+    }
+
+    /// Copies the token of `position` from one ring to another.
+    ///
+    /// # Panics
+    /// When a ring does not exist.
+    pub fn copy_token(&mut self, from_ring: usize, to_ring: usize, position: u64) {
+        let (from, to) = (self.at(from_ring, position), self.at(to_ring, position));
+        let range = from..from + self.dim;
+        match &mut self.store {
+            Store::F16(keys, values) => {
+                keys.copy_within(range.clone(), to);
+                values.copy_within(range, to);
+            }
+            Store::F32(keys, values) => {
+                keys.copy_within(range.clone(), to);
+                values.copy_within(range, to);
+            }
+        }
+    }
+
+    /// Bytes in memory.
+    pub fn bytes(&self) -> usize {
+        match &self.store {
+            Store::F16(k, v) => 2 * (k.len() + v.len()),
+            Store::F32(k, v) => 4 * (k.len() + v.len()),
+        }
+    }
+
+    /// Number of rings.
+    pub fn rings(&self) -> usize {
+        self.rings
+    }
+
+    /// Tokens of a ring.
+    pub fn capacity(&self) -> usize {
+        self.capacity
+    }
+
+    /// Values of a key or value row.
+    pub fn dim(&self) -> usize {
+        self.dim
+    }
+
+    fn at(&self, ring: usize, position: u64) -> usize {
+        assert!(ring < self.rings, "the cache has {} rings", self.rings);
+        (ring * self.capacity + self.slot(position)) * self.dim
+    }
+
+    /// Row of `position` in its ring.
+    pub(crate) fn slot(&self, position: u64) -> usize {
+        (position % self.capacity as u64) as usize
+    }
+}
+
+impl std::fmt::Debug for KvCache {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "KvCache({} rings x {} tokens x {})", self.rings, self.capacity, self.dim)
+    }
+}

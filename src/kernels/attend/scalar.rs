@@ -1,0 +1,81 @@
+use super::{CHUNK, Head};
+use crate::kernels::math::{LANES, exp, fold};
+
+pub(super) fn f16(head: &Head<'_, half::f16>, q: &[f32], out: &mut [f32]) {
+    body(head, q, out, half::f16::to_f32_const);
+}
+
+pub(super) fn f32(head: &Head<'_, f32>, q: &[f32], out: &mut [f32]) {
+    body(head, q, out, |v| v);
+}
+
+#[inline(always)]
+pub(super) fn body<T: Copy>(head: &Head<'_, T>, q: &[f32], out: &mut [f32], to_f32: impl Fn(T) -> f32 + Copy) {
+    head.check(q, out);
+    let n = q.len();
+    let scale = 1.0 / (n as f32).sqrt();
+    out.fill(0.0);
+    let (mut top, mut total) = (f32::NEG_INFINITY, 0.0f32);
+    for start in (0..head.len).step_by(CHUNK) {
+        let tokens = CHUNK.min(head.len - start);
+        let mut p = [0.0f32; CHUNK];
+        for (t, p) in p[..tokens].iter_mut().enumerate() {
+            *p = dot(q, &head.k[head.at(start + t)..][..n], to_f32) * scale;
+        }
+        let (keep, new_top) = soften(&mut p, tokens, top);
+        let sum = fold_chunk(&p);
+        total = total.mul_add(keep, sum);
+        top = new_top;
+        if start > 0 {
+            out.iter_mut().for_each(|o| *o *= keep);
+        }
+        for (t, p) in p[..tokens].iter().enumerate() {
+            let v = &head.v[head.at(start + t)..][..n];
+            for (o, v) in out.iter_mut().zip(v) {
+                *o = p.mul_add(to_f32(*v), *o);
+            }
+        }
+    }
+    if head.len > 0 {
+        let inverse = 1.0 / total;
+        out.iter_mut().for_each(|o| *o *= inverse);
+    }
+}
+
+#[inline(always)]
+fn dot<T: Copy>(q: &[f32], k: &[T], to_f32: impl Fn(T) -> f32) -> f32 {
+    let mut acc = [0.0f32; LANES];
+    let ((q, q_tail), (k, k_tail)) = (q.as_chunks::<LANES>(), k.as_chunks::<LANES>());
+    for (q, k) in q.iter().zip(k) {
+        for l in 0..LANES {
+            acc[l] = q[l].mul_add(to_f32(k[l]), acc[l]);
+        }
+    }
+    for (l, (q, k)) in q_tail.iter().zip(k_tail).enumerate() {
+        acc[l] = q.mul_add(to_f32(*k), acc[l]);
+    }
+    fold(acc)
+}
+
+/// Scores to weights relative to the new maximum, zeros past `tokens`; also what weights of the old maximum are to be multiplied by.
+#[inline(always)]
+pub(super) fn soften(p: &mut [f32; CHUNK], tokens: usize, top: f32) -> (f32, f32) {
+    let new_top = p[..tokens].iter().fold(top, |m, &s| if s > m { s } else { m });
+    for p in p.iter_mut() {
+        *p = exp(*p - new_top);
+    }
+    p[tokens..].fill(0.0);
+    (exp(top - new_top), new_top)
+}
+
+/// Sum of a chunk of weights: 16 lanes over the chunk, then folded.
+#[inline(always)]
+pub(super) fn fold_chunk(p: &[f32; CHUNK]) -> f32 {
+    let mut acc = [0.0f32; LANES];
+    for chunk in p.as_chunks::<LANES>().0 {
+        for (a, p) in acc.iter_mut().zip(chunk) {
+            *a += p;
+        }
+    }
+    fold(acc)
+}

@@ -1,0 +1,101 @@
+//! int8 rows times int4 weights in groups of 32 columns: tile\[r\]\[c\] = sum_g s\[c\]\[g\] (sum_{k in g} q\[r\]\[k\] (n\[c\]\[k\] - 8)).
+//!
+//! Nibbles n in 0..=15 stand for -8..=7; a group's scale is an f16. The inner sums are exact; the outer sum visits the groups in
+//! ascending order, one fused multiply-add each, from zero. The row's scale is applied by the [`epilogue`](super::epilogue).
+//!
+//! Packed panel: for each group four lines of 64 bytes, line j holding for each of 16 lanes 4 bytes, byte i with column 8j + i in the
+//! low nibble and 8j + 4 + i in the high one; after all groups their scales, 16 f16 a group.
+
+use half::f16;
+
+use super::packed::{NR, Tile};
+use super::quantize_rows::GROUP;
+use super::{Level, Variant};
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+#[cfg(target_arch = "x86_64")]
+mod avxvnni;
+#[cfg(target_arch = "aarch64")]
+mod dotprod;
+#[cfg(target_arch = "aarch64")]
+mod neon;
+mod scalar;
+
+/// Where an int4 weight and its scale lie.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Geometry {
+    pub(crate) groups: usize,
+    /// Bytes of one panel, an odd number of lines.
+    pub(crate) panel: usize,
+}
+
+/// Bytes of the nibbles of one group of one panel.
+pub(crate) const GROUP_BYTES: usize = GROUP * NR / 2;
+
+impl Geometry {
+    pub(crate) fn new(cols: usize) -> Self {
+        let groups = cols.div_ceil(GROUP);
+        Self { groups, panel: ((groups * (GROUP_BYTES + 2 * NR)).div_ceil(64) | 1) * 64 }
+    }
+
+    pub(crate) fn padded(&self) -> usize {
+        self.groups * GROUP
+    }
+
+    /// Byte that holds weight (`row`, `col`), and whether in its high nibble.
+    pub(crate) fn at(&self, row: usize, col: usize) -> (usize, bool) {
+        let byte = (row / NR) * self.panel + col / GROUP * GROUP_BYTES + col % GROUP / 8 * 64 + row % NR * 4 + col % 4;
+        (byte, col % 8 >= 4)
+    }
+
+    /// f16 element that holds the scale of group `group` of `row`.
+    pub(crate) fn scale_at(&self, row: usize, group: usize) -> usize {
+        ((row / NR) * self.panel + self.groups * GROUP_BYTES) / 2 + group * NR + row % NR
+    }
+}
+
+/// Operands: as of the int8 product, with int4 panels; `scales` is the same memory as `weights`.
+pub(crate) struct Job<'a> {
+    pub(crate) q: &'a [i8],
+    pub(crate) sums: &'a [i32],
+    pub(crate) rows: usize,
+    pub(crate) weights: &'a [u8],
+    pub(crate) scales: &'a [f16],
+    pub(crate) geo: Geometry,
+    pub(crate) first: usize,
+    pub(crate) panels: usize,
+}
+
+impl Job<'_> {
+    /// What every variant relies on.
+    pub(crate) fn check(&self) {
+        let n = self.rows * self.geo.groups;
+        assert!((1..=16).contains(&self.rows) && (1..=4).contains(&self.panels), "rows 1..=16, panels 1..=4");
+        assert!(self.q.len() >= n * GROUP && self.sums.len() >= n, "rows are padded");
+        let bytes = (self.first + self.panels) * self.geo.panel;
+        assert!(self.weights.len() >= bytes && self.scales.len() >= bytes / 2, "panels exist");
+    }
+}
+
+/// A variant's entry; unsafe to call on a CPU without its level.
+pub(crate) type Run = unsafe fn(&Job<'_>, &mut Tile<f32>);
+
+pub(crate) static VARIANTS: &[Variant<Run>] = &[
+    Variant { name: "scalar", level: Level::Scalar, run: scalar::run },
+    #[cfg(target_arch = "x86_64")]
+    Variant { name: "avx2", level: Level::Avx2, run: avx2::run },
+    #[cfg(target_arch = "x86_64")]
+    Variant { name: "avxvnni", level: Level::AvxVnni, run: avxvnni::run },
+    #[cfg(target_arch = "x86_64")]
+    Variant { name: "avx512_vnni", level: Level::Avx512, run: avx512::run },
+    #[cfg(target_arch = "aarch64")]
+    Variant { name: "neon", level: Level::Neon, run: neon::run },
+    #[cfg(target_arch = "aarch64")]
+    Variant { name: "dotprod", level: Level::Dotprod, run: dotprod::run },
+];
+
+#[cfg(test)]
+mod tests;

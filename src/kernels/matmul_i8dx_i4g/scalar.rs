@@ -1,0 +1,28 @@
+use super::{GROUP, GROUP_BYTES, Job, NR, Tile};
+
+pub(super) fn run(job: &Job<'_>, tile: &mut Tile<f32>) {
+    job.check();
+    let padded = job.geo.padded();
+    for r in 0..job.rows {
+        let q = &job.q[r * padded..][..padded];
+        for p in 0..job.panels {
+            let start = (job.first + p) * job.geo.panel;
+            let nibbles = job.weights[start..][..job.geo.groups * GROUP_BYTES].as_chunks::<GROUP_BYTES>().0;
+            let scales = &job.scales[(start + job.geo.groups * GROUP_BYTES) / 2..][..job.geo.groups * NR];
+            let mut sum = [0.0f32; NR];
+            for ((q, nibbles), scales) in q.chunks_exact(GROUP).zip(nibbles).zip(scales.chunks_exact(NR)) {
+                for l in 0..NR {
+                    let mut acc = 0i32;
+                    for (j, q) in q.as_chunks::<8>().0.iter().enumerate() {
+                        for (i, &byte) in nibbles[j * 64 + l * 4..][..4].iter().enumerate() {
+                            acc += i32::from(q[i]) * (i32::from(byte & 15) - 8);
+                            acc += i32::from(q[4 + i]) * (i32::from(byte >> 4) - 8);
+                        }
+                    }
+                    sum[l] = scales[l].to_f32_const().mul_add(acc as f32, sum[l]);
+                }
+            }
+            tile[r][p * NR..][..NR].copy_from_slice(&sum);
+        }
+    }
+}

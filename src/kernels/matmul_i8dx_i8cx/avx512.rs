@@ -1,0 +1,77 @@
+//! `vpdpbusd` multiplies unsigned by signed bytes and adds four products to an i32 without saturation. Weights are the
+//! unsigned side, offset by 128: sum q (w + 128) = sum q w + 128 sum q, so accumulators start at -128 sum q.
+
+use std::arch::x86_64::*;
+
+use super::{Job, NR, Tile};
+use crate::kernels::packed::for_rows;
+use crate::kernels::quantize_rows::GROUP;
+
+/// Parts of a panel's columns that are read side by side.
+const STREAMS: usize = 2;
+/// Bytes ahead of each stream that are asked for.
+const AHEAD: usize = 1024;
+
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
+pub(super) fn run(job: &Job<'_>, tile: &mut Tile<i32>) {
+    job.check();
+    for_rows!(job.rows, R => rows::<R>(job, tile))
+}
+
+/// As many panels at once as accumulators fit 24 registers.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
+fn rows<const R: usize>(job: &Job<'_>, tile: &mut Tile<i32>) {
+    let mut p = 0;
+    while R <= 6 && p + 4 <= job.panels {
+        block::<R, 4>(job, p, tile);
+        p += 4;
+    }
+    while R <= 12 && p + 2 <= job.panels {
+        block::<R, 2>(job, p, tile);
+        p += 2;
+    }
+    while p < job.panels {
+        block::<R, 1>(job, p, tile);
+        p += 1;
+    }
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
+fn block<const R: usize, const P: usize>(job: &Job<'_>, p: usize, tile: &mut Tile<i32>) {
+    let padded = job.geo.padded;
+    let weights = job.weights[(job.first + p) * job.geo.panel..][..P * job.geo.panel].as_ptr();
+    let q = job.q[..R * padded].as_ptr();
+    let groups = padded / GROUP;
+    let mut acc = [[_mm512_setzero_si512(); P]; R];
+    for (r, acc) in acc.iter_mut().enumerate() {
+        let sum: i32 = job.sums[r * groups..][..groups].iter().sum();
+        *acc = [_mm512_set1_epi32(-128 * sum); P];
+    }
+    let quads = padded / 4;
+    let part = quads / STREAMS;
+    for k in 0..part {
+        for s in 0..STREAMS {
+            let k = k + s * part;
+            for c in 0..P {
+                // SAFETY: k < quads, so the line lies in panel c of the slice; a prefetch may point anywhere.
+                let w = unsafe {
+                    let line = weights.add(c * job.geo.panel + k * 64);
+                    _mm_prefetch::<_MM_HINT_T0>(line.wrapping_add(AHEAD).cast());
+                    _mm512_loadu_si512(line.cast())
+                };
+                for r in 0..R {
+                    // SAFETY: 4 bytes at column 4k of row r, within R rows of `padded` bytes.
+                    let x = unsafe { q.add(r * padded + 4 * k).cast::<i32>().read_unaligned() };
+                    acc[r][c] = _mm512_dpbusd_epi32(acc[r][c], w, _mm512_set1_epi32(x));
+                }
+            }
+        }
+    }
+    for (r, acc) in acc.iter().enumerate() {
+        for (c, acc) in acc.iter().enumerate() {
+            let out = &mut tile[r][(p + c) * NR..][..NR];
+            // SAFETY: 16 values at `out`.
+            unsafe { _mm512_storeu_si512(out.as_mut_ptr().cast(), *acc) };
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! int8 rows times int8 weights: tile\[r\]\[c\] = sum_k q\[r\]\[k\] w\[c\]\[k\], exact in i32.
+//!
+//! `i8dx`: int8 activations, symmetric, quantised per row when they come ([`quantize_rows`](super::quantize_rows)), in -127..=127.
+//! `i8cx`: int8 weights, symmetric, one scale per output channel, in -128..=127. Scales are applied by the [`epilogue`](super::epilogue).
+//! Sums stay below 2^31 for up to 131,071 columns, also with weights offset to unsigned.
+
+use super::packed::{NR, Tile};
+use super::quantize_rows::GROUP;
+use super::{Level, Variant};
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+#[cfg(target_arch = "x86_64")]
+mod avxvnni;
+#[cfg(target_arch = "aarch64")]
+pub(crate) mod dotprod;
+#[cfg(target_arch = "aarch64")]
+mod i8mm;
+#[cfg(target_arch = "aarch64")]
+mod neon;
+mod scalar;
+
+/// Order of the bytes of 16 outputs x 4 or 8 columns in packed weights, as a variant wants them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Layout {
+    /// Lines of 64 bytes: for each lane 4 consecutive columns.
+    Quads,
+    /// [`Quads`](Self::Quads) with 128 added to each weight: unsigned. The kernel takes off 128 times the row's sum.
+    QuadsOffset,
+    /// [`Quads`](Self::Quads) with the columns of a lane in the order 0, 2, 1, 3: even bytes hold columns 0 and 1.
+    QuadsPaired,
+    /// Pairs of lines: for each lane 8 consecutive columns.
+    Octets,
+}
+
+/// Where an int8 weight lies.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Geometry {
+    /// Columns, padded with zeros to whole groups.
+    pub(crate) padded: usize,
+    /// Bytes of one panel: `16 padded` and one line, which keeps panels in different sets of the first-level cache.
+    pub(crate) panel: usize,
+    pub(crate) layout: Layout,
+}
+
+impl Geometry {
+    pub(crate) fn new(cols: usize, layout: Layout) -> Self {
+        let padded = cols.next_multiple_of(GROUP);
+        Self { padded, panel: NR * padded + 64, layout }
+    }
+
+    /// Byte that holds weight (`row`, `col`).
+    pub(crate) fn at(&self, row: usize, col: usize) -> usize {
+        let (panel, lane) = (row / NR, row % NR);
+        let within = match self.layout {
+            Layout::Quads | Layout::QuadsOffset => col / 4 * 64 + lane * 4 + col % 4,
+            Layout::QuadsPaired => col / 4 * 64 + lane * 4 + [0, 2, 1, 3][col % 4],
+            Layout::Octets => col / 8 * 128 + lane * 8 + col % 8,
+        };
+        panel * self.panel + within
+    }
+
+    /// The byte for weight `q`; padding is the byte for 0.
+    pub(crate) fn encode(&self, q: i8) -> u8 {
+        if self.layout == Layout::QuadsOffset { (q as u8) ^ 0x80 } else { q as u8 }
+    }
+}
+
+/// Operands: `rows` in 1..=16 rows of `geo.padded` values at `q` (and widened at `wide`, where the variant asks for it), the sums of
+/// their groups of 32 at `sums`; `panels` in 1..=4 panels from `first`.
+pub(crate) struct Job<'a> {
+    pub(crate) q: &'a [i8],
+    pub(crate) wide: &'a [i16],
+    pub(crate) sums: &'a [i32],
+    pub(crate) rows: usize,
+    pub(crate) weights: &'a [u8],
+    pub(crate) geo: Geometry,
+    pub(crate) first: usize,
+    pub(crate) panels: usize,
+}
+
+impl Job<'_> {
+    /// What every variant relies on.
+    pub(crate) fn check(&self) {
+        let n = self.rows * self.geo.padded;
+        assert!((1..=16).contains(&self.rows) && (1..=4).contains(&self.panels), "rows 1..=16, panels 1..=4");
+        assert!(self.q.len() >= n && self.sums.len() >= n / GROUP, "rows are padded");
+        assert!(self.weights.len() >= (self.first + self.panels) * self.geo.panel, "panels exist");
+    }
+}
+
+/// A variant: its entry (unsafe to call on a CPU without its level), the layout it reads, and whether it reads `wide`.
+pub(crate) struct Kernel {
+    pub(crate) run: unsafe fn(&Job<'_>, &mut Tile<i32>),
+    pub(crate) layout: Layout,
+    pub(crate) wide: bool,
+}
+
+pub(crate) static VARIANTS: &[Variant<Kernel>] = &[
+    Variant {
+        name: "scalar",
+        level: Level::Scalar,
+        run: Kernel { run: scalar::run, layout: Layout::Quads, wide: false },
+    },
+    #[cfg(target_arch = "x86_64")]
+    Variant {
+        name: "avx2",
+        level: Level::Avx2,
+        run: Kernel { run: avx2::run, layout: Layout::QuadsPaired, wide: true },
+    },
+    #[cfg(target_arch = "x86_64")]
+    Variant {
+        name: "avxvnni",
+        level: Level::AvxVnni,
+        run: Kernel { run: avxvnni::run, layout: Layout::QuadsOffset, wide: false },
+    },
+    #[cfg(target_arch = "x86_64")]
+    Variant {
+        name: "avx512_vnni",
+        level: Level::Avx512,
+        run: Kernel { run: avx512::run, layout: Layout::QuadsOffset, wide: false },
+    },
+    #[cfg(target_arch = "aarch64")]
+    Variant { name: "neon", level: Level::Neon, run: Kernel { run: neon::run, layout: Layout::Quads, wide: false } },
+    #[cfg(target_arch = "aarch64")]
+    Variant {
+        name: "dotprod",
+        level: Level::Dotprod,
+        run: Kernel { run: dotprod::run, layout: Layout::Quads, wide: false },
+    },
+    #[cfg(target_arch = "aarch64")]
+    Variant { name: "i8mm", level: Level::I8mm, run: Kernel { run: i8mm::run, layout: Layout::Octets, wide: false } },
+];
+
+#[cfg(test)]
+mod tests;

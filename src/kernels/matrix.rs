@@ -1,0 +1,180 @@
+//! Linear layers: plain weights in, packed weights for one level out.
+
+use half::f16;
+
+use super::packed::{Buffer, FloatGeometry, NR};
+use super::quantize_rows::GROUP;
+use super::{Kernels, Variant, matmul_f32_f16, matmul_f32_f32, matmul_i8dx_i4g, matmul_i8dx_i8cx};
+
+/// Columns that share a scale in int4 weights.
+pub const I4_GROUP: usize = GROUP;
+
+/// Weights of a linear layer as a bundle holds them: row-major, `rows` outputs x `cols` inputs.
+#[derive(Debug, Clone, Copy)]
+pub struct Weights<'a> {
+    /// Output features.
+    pub rows: usize,
+    /// Input features.
+    pub cols: usize,
+    /// The values and their scheme.
+    pub data: WeightData<'a>,
+}
+
+/// Values of a weight matrix in one of the four schemes.
+#[derive(Debug, Clone, Copy)]
+pub enum WeightData<'a> {
+    /// `rows * cols` floats.
+    F32(&'a [f32]),
+    /// `rows * cols` half floats; products and sums are in f32.
+    F16(&'a [f16]),
+    /// Symmetric int8: weight = `q[r][c] * scale[r]`; activations are quantised to int8 per row.
+    I8 {
+        /// `rows * cols` values.
+        q: &'a [i8],
+        /// One scale a row.
+        scale: &'a [f32],
+    },
+    /// Group-wise int4: weight = `(n - 8) * scale[r][c / 32]`, n in 0..=15; activations are quantised to int8 per row.
+    I4 {
+        /// `rows * ceil(cols / 2)` bytes: column 2i in the low nibble of byte i of its row, 2i + 1 in the high one.
+        q: &'a [u8],
+        /// `rows * ceil(cols / 32)` scales.
+        scale: &'a [f16],
+    },
+}
+
+/// A linear layer packed for one CPU level: weights, scales and bias.
+pub struct Matrix {
+    pub(super) out: usize,
+    pub(super) cols: usize,
+    /// Padded with zeros to whole panels, as are the scales.
+    pub(super) bias: Vec<f32>,
+    pub(super) body: Body,
+}
+
+/// Packed weights with the variant they are packed for; the variant came from a [`Kernels`], hence runs on this CPU.
+pub(super) enum Body {
+    F32(Buffer, FloatGeometry, &'static Variant<matmul_f32_f32::Run>),
+    F16(Buffer, FloatGeometry, &'static Variant<matmul_f32_f16::Run>),
+    I8(Buffer, matmul_i8dx_i8cx::Geometry, Vec<f32>, &'static Variant<matmul_i8dx_i8cx::Kernel>),
+    I4(Buffer, matmul_i8dx_i4g::Geometry, &'static Variant<matmul_i8dx_i4g::Run>),
+}
+
+impl Matrix {
+    pub(super) fn pack(kernels: &Kernels, w: Weights<'_>, bias: Option<&[f32]>) -> Matrix {
+        let Weights { rows, cols, data } = w;
+        assert!(rows > 0 && cols > 0, "pack: a layer has inputs and outputs");
+        let padded_rows = rows.next_multiple_of(NR);
+        let panels = padded_rows / NR;
+        let pad = |v: &[f32]| {
+            assert_eq!(v.len(), rows, "pack: one bias, and one scale, for each output");
+            let mut v = v.to_vec();
+            v.resize(padded_rows, 0.0);
+            v
+        };
+        let bias = bias.map_or_else(|| vec![0.0; padded_rows], pad);
+        let body = match data {
+            WeightData::F32(w) => {
+                let geo = FloatGeometry::new(cols, 4);
+                Body::F32(pack_floats(w, rows, cols, &geo, panels), geo, kernels.f32)
+            }
+            WeightData::F16(w) => {
+                let geo = FloatGeometry::new(cols, 2);
+                Body::F16(pack_floats(w, rows, cols, &geo, panels), geo, kernels.f16)
+            }
+            WeightData::I8 { q, scale } => {
+                assert_eq!(q.len(), rows * cols, "pack: rows * cols values");
+                let geo = matmul_i8dx_i8cx::Geometry::new(cols, kernels.i8.run.layout);
+                let mut buffer = Buffer::new(panels * geo.panel);
+                let bytes = buffer.of_mut::<u8>();
+                bytes.fill(geo.encode(0));
+                for (r, row) in q.chunks_exact(cols).enumerate() {
+                    for (c, &v) in row.iter().enumerate() {
+                        bytes[geo.at(r, c)] = geo.encode(v);
+                    }
+                }
+                Body::I8(buffer, geo, pad(scale), kernels.i8)
+            }
+            WeightData::I4 { q, scale } => {
+                Body::I4(pack_nibbles(q, scale, rows, cols, panels), matmul_i8dx_i4g::Geometry::new(cols), kernels.i4)
+            }
+        };
+        Matrix { out: rows, cols, bias, body }
+    }
+
+    /// Length of a row of results.
+    pub fn out_features(&self) -> usize {
+        self.out
+    }
+
+    /// Length of a row of activations.
+    pub fn in_features(&self) -> usize {
+        self.cols
+    }
+
+    /// Bytes in memory: packed weights, scales and bias.
+    pub fn bytes(&self) -> usize {
+        4 * self.bias.len()
+            + match &self.body {
+                Body::F32(b, ..) | Body::F16(b, ..) | Body::I4(b, ..) => b.bytes(),
+                Body::I8(b, _, scale, _) => b.bytes() + 4 * scale.len(),
+            }
+    }
+
+    /// Scheme of the weights: `f32`, `f16`, `i8` or `i4`.
+    pub fn scheme(&self) -> &'static str {
+        match &self.body {
+            Body::F32(..) => "f32",
+            Body::F16(..) => "f16",
+            Body::I8(..) => "i8",
+            Body::I4(..) => "i4",
+        }
+    }
+}
+
+impl std::fmt::Debug for Matrix {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Matrix({} x {} {})", self.out, self.cols, self.scheme())
+    }
+}
+
+fn pack_floats<T: super::packed::Plain>(
+    w: &[T],
+    rows: usize,
+    cols: usize,
+    geo: &FloatGeometry,
+    panels: usize,
+) -> Buffer {
+    assert_eq!(w.len(), rows * cols, "pack: rows * cols values");
+    let mut buffer = Buffer::new(panels * geo.panel * size_of::<T>());
+    let packed = buffer.of_mut::<T>();
+    for (r, row) in w.chunks_exact(cols).enumerate() {
+        for (c, &v) in row.iter().enumerate() {
+            packed[geo.at(r, c)] = v;
+        }
+    }
+    buffer
+}
+
+fn pack_nibbles(q: &[u8], scale: &[f16], rows: usize, cols: usize, panels: usize) -> Buffer {
+    let geo = matmul_i8dx_i4g::Geometry::new(cols);
+    let stride = cols.div_ceil(2);
+    assert_eq!(q.len(), rows * stride, "pack: rows * ceil(cols / 2) bytes");
+    assert_eq!(scale.len(), rows * geo.groups, "pack: rows * ceil(cols / 32) scales");
+    let mut buffer = Buffer::new(panels * geo.panel);
+    let bytes = buffer.of_mut::<u8>();
+    for (r, row) in q.chunks_exact(stride).enumerate() {
+        for c in 0..cols {
+            let nibble = (row[c / 2] >> (4 * (c % 2))) & 15;
+            let (at, high) = geo.at(r, c);
+            bytes[at] |= nibble << (4 * u32::from(high));
+        }
+    }
+    let scales = buffer.of_mut::<f16>();
+    for (r, row) in scale.chunks_exact(geo.groups).enumerate() {
+        for (g, &s) in row.iter().enumerate() {
+            scales[geo.scale_at(r, g)] = s;
+        }
+    }
+    buffer
+}

@@ -1,0 +1,42 @@
+use super::GROUP;
+
+pub(super) fn run(x: &[f32], q: &mut [i8], sums: &mut [i32]) -> f32 {
+    body(x, q, sums)
+}
+
+/// Below this a row counts as zero: 127 / max|x| would overflow.
+const TINY: f32 = 1e-30;
+
+/// Rounds to nearest even: the low byte of x + MAGIC is the integer, for |x| < 2^22.
+const MAGIC: f32 = 12_582_912.0;
+
+/// Magnitudes are compared as integers: exact, and a NaN is larger than everything.
+#[inline(always)]
+pub(super) fn body(x: &[f32], q: &mut [i8], sums: &mut [i32]) -> f32 {
+    assert!(q.len() >= x.len() && q.len() == sums.len() * GROUP, "q is padded to whole groups");
+    let mut top = [0u32; 16];
+    let (head, tail) = x.as_chunks::<16>();
+    for chunk in head {
+        for (t, v) in top.iter_mut().zip(chunk) {
+            *t = (*t).max(v.to_bits() & 0x7fff_ffff);
+        }
+    }
+    for (t, v) in top.iter_mut().zip(tail) {
+        *t = (*t).max(v.to_bits() & 0x7fff_ffff);
+    }
+    let top = f32::from_bits(top.into_iter().fold(0, u32::max));
+    if !(TINY..f32::INFINITY).contains(&top) {
+        q.fill(0);
+        sums.fill(0);
+        return if top < TINY { 0.0 } else { f32::NAN };
+    }
+    let inverse = 127.0 / top;
+    for (q, x) in q.iter_mut().zip(x) {
+        *q = (x * inverse + MAGIC).to_bits() as u8 as i8;
+    }
+    q[x.len()..].fill(0);
+    for (sum, group) in sums.iter_mut().zip(q.as_chunks::<GROUP>().0) {
+        *sum = group.iter().map(|&v| i32::from(v)).sum();
+    }
+    top / 127.0
+}

@@ -1,0 +1,51 @@
+use super::{GROUP, VARIANTS};
+use crate::kernels::testing::{Random, available};
+
+fn run(v: &crate::kernels::Variant<super::Run>, x: &[f32]) -> (u32, Vec<i8>, Vec<i32>) {
+    let padded = x.len().next_multiple_of(GROUP);
+    let (mut q, mut sums) = (vec![99; padded], vec![99; padded / GROUP]);
+    // SAFETY: `available` yields only what this CPU can run.
+    let scale = unsafe { (v.run)(x, &mut q, &mut sums) };
+    (if scale.is_nan() { u32::MAX } else { scale.to_bits() }, q, sums)
+}
+
+#[test]
+fn variants_have_the_bits_of_the_reference() {
+    let mut random = Random(51);
+    for n in (0..140).chain([1024, 4096]) {
+        for size in [1e-38f32, 1e-31, 1e-29, 1.0, 3e38] {
+            let mut x = random.floats(n + 1, size);
+            if n > 0 && random.below(4) == 0 {
+                x[1 + random.below(n)] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0][random.below(4)];
+            }
+            let want = run(&VARIANTS[0], &x[1..]);
+            for v in available(VARIANTS) {
+                assert_eq!(run(v, &x[1..]), want, "{} {n} {size}", v.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn values_come_back_within_half_a_step() {
+    let mut random = Random(52);
+    for v in available(VARIANTS) {
+        let x = random.floats(100, 5.0);
+        let (scale, q, sums) = run(v, &x);
+        let scale = f32::from_bits(scale);
+        for (x, &q) in x.iter().zip(&q) {
+            assert!((x - f32::from(q) * scale).abs() <= 0.50001 * scale, "{}: {x} as {q} * {scale}", v.name);
+        }
+        assert_eq!(q.iter().map(|&q| i32::from(q).abs()).max(), Some(127), "the largest value uses the whole range");
+        assert_eq!(sums.iter().sum::<i32>(), q.iter().map(|&q| i32::from(q)).sum::<i32>());
+        assert!(q[100..].iter().all(|&q| q == 0), "padding is zero");
+    }
+}
+
+#[test]
+fn halves_round_to_even() {
+    for v in available(VARIANTS) {
+        let (_, q, _) = run(v, &[127.0, 0.5, 1.5, 2.5, -0.5, -1.5, -127.0]);
+        assert_eq!(q[..7], [127, 0, 2, 2, 0, -2, -127], "{}", v.name);
+    }
+}

@@ -1,0 +1,148 @@
+//! One pre-norm transformer layer, run over a few rows at a time with its keys and values in a ring cache.
+//!
+//! ```text
+//! x += gate1 * proj(attend(qkv(norm1(x))))
+//! x += gate2 * fc2(gelu(fc1(norm2(x))))
+//! ```
+
+use super::Phases;
+use crate::kernels::{Epilogue, Exec, KvCache, Matrix, RowTable, Span};
+
+/// Weights of a layer of width `d`.
+#[derive(Debug)]
+pub struct Layer {
+    /// Queries, keys and values: `[3d, d]`.
+    pub qkv: Matrix,
+    /// Output projection of the attention: `[d, d]`.
+    pub proj: Matrix,
+    /// First feed-forward matrix: `[mlp, d]`.
+    pub fc1: Matrix,
+    /// Second feed-forward matrix: `[d, mlp]`.
+    pub fc2: Matrix,
+}
+
+/// Shift, scale and gate of both halves of a layer, one table row for each row of the pass.
+///
+/// Plain layer norms have their bias as the shift, their weight as the scale and no gates; AdaLN-Zero (Peebles and Xie
+/// 2023) has all six, with `1 + scale` stored as the scale.
+#[derive(Clone, Copy)]
+pub struct LayerNorms<'a> {
+    /// Shift and scale before the attention.
+    pub norm1: (RowTable<'a>, RowTable<'a>),
+    /// Gate of the attention.
+    pub gate1: Option<RowTable<'a>>,
+    /// Shift and scale before the feed-forward.
+    pub norm2: (RowTable<'a>, RowTable<'a>),
+    /// Gate of the feed-forward.
+    pub gate2: Option<RowTable<'a>>,
+}
+
+/// The rows of a pass: for each, the ring of layer 0 that it writes to (layer `l` writes to the `l`-th ring after it),
+/// its position there, and how far back it sees.
+#[derive(Debug, Clone, Default)]
+pub struct Rows {
+    base: Vec<u32>,
+    spans: Vec<Span>,
+    positions: Vec<u64>,
+}
+
+impl Rows {
+    /// Room for `rows` rows.
+    pub fn with_capacity(rows: usize) -> Self {
+        Self { base: Vec::with_capacity(rows), spans: Vec::with_capacity(rows), positions: Vec::with_capacity(rows) }
+    }
+
+    /// No rows, room kept.
+    pub fn clear(&mut self) {
+        self.base.clear();
+        self.spans.clear();
+        self.positions.clear();
+    }
+
+    /// Adds a row at `position` of the rings from `ring` on, which sees positions `first ..= position`.
+    pub fn push(&mut self, ring: usize, position: u64, first: u64) {
+        debug_assert!(first <= position && self.base.len() < self.base.capacity());
+        self.base.push(ring as u32);
+        self.positions.push(position);
+        self.spans.push(Span { ring: ring as u32, first, len: (position - first + 1) as u32 });
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.base.len()
+    }
+
+    /// Whether there are no rows.
+    pub fn is_empty(&self) -> bool {
+        self.base.is_empty()
+    }
+
+    /// Positions, a row each.
+    pub fn positions(&self) -> &[u64] {
+        &self.positions
+    }
+
+    fn select_layer(&mut self, layer: usize) {
+        for (span, base) in self.spans.iter_mut().zip(&self.base) {
+            span.ring = base + layer as u32;
+        }
+    }
+}
+
+/// Working memory of a pass of at most `rows` rows.
+#[derive(Debug)]
+pub struct Scratch {
+    normed: Vec<f32>,
+    qkv: Vec<f32>,
+    hidden: Vec<f32>,
+}
+
+impl Scratch {
+    /// Memory for layers of width `width` with a feed-forward of `mlp`.
+    pub fn new(rows: usize, width: usize, mlp: usize) -> Self {
+        Self { normed: vec![0.0; rows * width], qkv: vec![0.0; rows * 3 * width], hidden: vec![0.0; rows * mlp] }
+    }
+}
+
+impl Layer {
+    /// Runs layer number `index` over `x` (`rows x d`, in place): writes the rows' keys and values to `cache`, then
+    /// attends over each row's span.
+    #[allow(clippy::too_many_arguments, reason = "a layer's pass needs all of them, and they have no natural owner")]
+    pub fn run(
+        &self,
+        exec: &mut Exec,
+        index: usize,
+        heads: usize,
+        norms: LayerNorms<'_>,
+        phases: &Phases,
+        cache: &mut KvCache,
+        rows: &mut Rows,
+        scratch: &mut Scratch,
+        x: &mut [f32],
+    ) {
+        let (n, d) = (rows.len(), self.proj.out_features());
+        let x = &mut x[..n * d];
+        let normed = &mut scratch.normed[..n * d];
+        let qkv = &mut scratch.qkv[..n * 3 * d];
+        let hidden = &mut scratch.hidden[..n * self.fc1.out_features()];
+        rows.select_layer(index);
+
+        exec.norm(x, n, d, norms.norm1.0, norms.norm1.1, normed);
+        exec.linear(&self.qkv, normed, n, qkv, Epilogue::Store);
+        let half = n * d / heads / 2;
+        exec.rope(qkv, n, 3 * d, 2 * heads, d / heads, &phases.cos[..half], &phases.sin[..half]);
+        for ((span, position), row) in rows.spans.iter().zip(&rows.positions).zip(qkv.chunks_exact(3 * d)) {
+            cache.write(span.ring as usize, *position, &row[d..2 * d], &row[2 * d..]);
+        }
+        exec.attend(qkv, 3 * d, heads, cache, &rows.spans, normed);
+        exec.linear(&self.proj, normed, n, x, gated(norms.gate1));
+
+        exec.norm(x, n, d, norms.norm2.0, norms.norm2.1, normed);
+        exec.linear(&self.fc1, normed, n, hidden, Epilogue::Gelu);
+        exec.linear(&self.fc2, hidden, n, x, gated(norms.gate2));
+    }
+}
+
+fn gated(gate: Option<RowTable<'_>>) -> Epilogue<'_> {
+    gate.map_or(Epilogue::Add, Epilogue::GatedAdd)
+}

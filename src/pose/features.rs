@@ -1,0 +1,279 @@
+//! Feature vectors to world transforms and back.
+
+use super::icosahedron::{decode, encode};
+use super::{Fit, Rig};
+use crate::error::{Error, ErrorKind, Result};
+use crate::frame::{Frame, JOINT_CHANNELS, ROOT_CHANNELS, Root, Transform};
+use crate::kernels::Kernels;
+use glam::{Mat3, Quat, Vec3};
+
+/// Length F of the feature vector of `joints` joints: `3 + 36 joints`.
+pub const fn feature_count(joints: usize) -> usize {
+    ROOT_CHANNELS + JOINT_CHANNELS * joints
+}
+
+/// The root of a body whose hips are at `hips` (world): floor projection of the hips, heading of their +Z axis.
+///
+/// Hips whose +Z axis is upright (within 0.6 degrees) have no heading; they get `yaw`, best that of the frame before.
+pub fn root_of(hips: &Transform, yaw: f64) -> Root {
+    let z = hips.rotation * Vec3::Z;
+    let upright = z.x.hypot(z.z) < 0.01;
+    let yaw = if upright { yaw } else { f64::from(z.x).atan2(f64::from(z.z)) };
+    Root { x: f64::from(hips.position.x), z: f64::from(hips.position.z), yaw }
+}
+
+/// Streaming decoder of feature vectors: integrates the root, places the joints in the world and fits the rig.
+///
+/// A feature vector `x` holds `F = 3 + 36 J` unstandardised values: `(vx, vz)` the root's displacement since the frame
+/// before in that frame's heading frame (m/frame), `dyaw` the turn (rad/frame), then for each joint the 12 vertices of its
+/// icosahedron ([`super::icosahedron`]) in *this* frame's heading frame (origin: the root on the floor; +Z: the heading).
+///
+/// Decoding allocates nothing, provided that the frame's buffers have room for J joints ([`Frame::empty`]).
+#[derive(Debug, Clone)]
+pub struct Decoder {
+    radius: f32,
+    root: Root,
+    fit: Fit,
+    kernels: Kernels,
+    /// Joints in the heading frame.
+    joints: Vec<Transform>,
+    maps: Vec<[f32; 9]>,
+    rotations: Vec<[f32; 9]>,
+    /// World rotations of the frame before, for the signs of the quaternions.
+    previous: Vec<Quat>,
+}
+
+impl Decoder {
+    /// A decoder for `rig` and icosahedra of circumradius `radius` (metres), with the root at the origin facing +Z.
+    pub fn new(kernels: Kernels, rig: &Rig, radius: f32) -> Self {
+        let n = rig.len();
+        Self {
+            radius,
+            root: Root::default(),
+            fit: Fit::new(kernels, rig),
+            kernels,
+            joints: vec![Transform::IDENTITY; n],
+            maps: vec![[0.0; 9]; n],
+            rotations: vec![[0.0; 9]; n],
+            previous: vec![Quat::IDENTITY; n],
+        }
+    }
+
+    /// Length F of a feature vector.
+    pub fn feature_count(&self) -> usize {
+        feature_count(self.joints.len())
+    }
+
+    /// The root of the last frame.
+    pub fn root(&self) -> Root {
+        self.root
+    }
+
+    /// Starts again from `root`, as if it were the root of the frame before the next.
+    pub fn reset(&mut self, root: Root) {
+        self.root = root;
+        self.fit.reset();
+        self.previous.fill(Quat::IDENTITY);
+    }
+
+    /// Decodes the next frame: advances the root and fills `root`, `global`, `hips`, `local` and `fit_error` of `frame`;
+    /// its other fields are left alone.
+    ///
+    /// # Errors
+    /// [`ErrorKind::State`] if a value of `x` is not finite; the decoder is then as before and `frame` untouched.
+    ///
+    /// # Panics
+    /// If `x` is not F long.
+    pub fn decode(&mut self, x: &[f32], frame: &mut Frame) -> Result<()> {
+        assert_eq!(x.len(), self.feature_count(), "a feature vector has 3 + 36 J values");
+        if !x.iter().all(|v| v.is_finite()) {
+            return Err(Error::new(
+                ErrorKind::State,
+                "the model gave a pose that is not finite; reset the session, and check the bundle if it happens again",
+            ));
+        }
+        let (root, joints) = x.split_at(ROOT_CHANNELS);
+        self.root = self.root.advanced(root[0], root[1], root[2]);
+        let vertices = joints.as_chunks::<JOINT_CHANNELS>().0;
+        for ((joint, map), vertices) in self.joints.iter_mut().zip(&mut self.maps).zip(vertices) {
+            (joint.position, *map) = decode(vertices, self.radius);
+        }
+        self.kernels.polar(&self.maps, &mut self.rotations);
+        for (joint, r) in self.joints.iter_mut().zip(&self.rotations) {
+            joint.rotation = Quat::from_mat3(&Mat3::from_cols_array(r).transpose()).normalize();
+        }
+        self.place(frame);
+        self.fit.fit(&self.joints, &self.root, frame);
+        Ok(())
+    }
+
+    fn place(&mut self, frame: &mut Frame) {
+        let heading = self.root.rotation();
+        frame.root = self.root;
+        frame.global.resize(self.joints.len(), Transform::IDENTITY);
+        for ((world, joint), previous) in frame.global.iter_mut().zip(&self.joints).zip(&mut self.previous) {
+            let q = (heading * joint.rotation).normalize();
+            let rotation = if q.dot(*previous) < 0.0 { -q } else { q };
+            *world = Transform { position: self.root.to_world(joint.position), rotation };
+            *previous = rotation;
+        }
+    }
+}
+
+/// The way back: world transforms of consecutive frames to unstandardised feature vectors.
+///
+/// With the roots that a [`Decoder`] gave, it returns what the decoder was given, vertices made rigid.
+#[derive(Debug, Clone)]
+pub struct Encoder {
+    radius: f32,
+    previous: Option<Root>,
+}
+
+impl Encoder {
+    /// An encoder with icosahedra of circumradius `radius`, metres. Its first frame has root channels 0.
+    pub fn new(radius: f32) -> Self {
+        Self { radius, previous: None }
+    }
+
+    /// Starts again; `previous` is the root of the frame before the next, if there is one.
+    pub fn reset(&mut self, previous: Option<Root>) {
+        self.previous = previous;
+    }
+
+    /// Writes the feature vector of the next frame, whose root is `root` ([`root_of`], or [`Frame::root`]) and whose joints
+    /// stand at `global` (world, J of them), to `x`.
+    ///
+    /// # Panics
+    /// If `x` is not `3 + 36 J` long.
+    pub fn encode(&mut self, root: Root, global: &[Transform], x: &mut [f32]) {
+        assert_eq!(x.len(), feature_count(global.len()), "a feature vector has 3 + 36 J values");
+        let (head, joints) = x.split_at_mut(ROOT_CHANNELS);
+        head.copy_from_slice(&step(self.previous.unwrap_or(root), root));
+        let heading = root.rotation().inverse();
+        for (joint, vertices) in global.iter().zip(joints.as_chunks_mut::<JOINT_CHANNELS>().0) {
+            let local = Transform { position: root.to_local(joint.position), rotation: heading * joint.rotation };
+            encode(&local, self.radius, vertices);
+        }
+        self.previous = Some(root);
+    }
+}
+
+/// `(vx, vz, dyaw)` from one root to the next: the inverse of [`Root::advanced`].
+fn step(from: Root, to: Root) -> [f32; 3] {
+    let (s, c) = from.yaw.sin_cos();
+    let (x, z) = (to.x - from.x, to.z - from.z);
+    let turn = std::f64::consts::TAU;
+    let dyaw = to.yaw - from.yaw;
+    [c * x - s * z, s * x + c * z, dyaw - turn * (dyaw / turn).round()].map(|v| v as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic;
+    use super::*;
+
+    const RADIUS: f32 = 0.1;
+
+    fn features(frames: &[Frame]) -> Vec<Vec<f32>> {
+        let mut encoder = Encoder::new(RADIUS);
+        let encode = |f: &Frame| {
+            let mut x = vec![0.0; feature_count(f.global.len())];
+            encoder.encode(f.root, &f.global, &mut x);
+            x
+        };
+        frames.iter().map(encode).collect()
+    }
+
+    #[test]
+    fn transforms_survive_the_round_trip() {
+        let recording = synthetic::walk(300);
+        let mut decoder = Decoder::new(Kernels::detect().unwrap(), &recording.rig, RADIUS);
+        decoder.reset(recording.frames[0].root);
+        let mut out = Frame::empty(recording.rig.len());
+        for (x, frame) in features(&recording.frames).iter().zip(&recording.frames) {
+            decoder.decode(x, &mut out).unwrap();
+            assert!((out.root.x - frame.root.x).hypot(out.root.z - frame.root.z) < 1e-5);
+            for (a, b) in out.global.iter().zip(&frame.global) {
+                assert!(a.position.distance(b.position) < 1e-5, "{} {}", a.position, b.position);
+                assert!(a.rotation.dot(b.rotation).abs() > 1.0 - 1e-5);
+            }
+            assert!(out.fit_error < 1e-5, "{}", out.fit_error);
+            assert!(out.hips.distance(frame.hips) < 1e-5);
+        }
+    }
+
+    #[test]
+    fn features_survive_the_round_trip() {
+        let recording = synthetic::walk(60);
+        let expected = features(&recording.frames);
+        let mut decoder = Decoder::new(Kernels::detect().unwrap(), &recording.rig, RADIUS);
+        // From elsewhere, with a heading close to the seam at half a turn.
+        decoder.reset(Root { x: -31.0, z: 12.5, yaw: 3.0 });
+        let mut encoder = Encoder::new(RADIUS);
+        encoder.reset(Some(decoder.root()));
+        let mut frame = Frame::empty(recording.rig.len());
+        let mut x = vec![0.0; decoder.feature_count()];
+        for e in &expected {
+            decoder.decode(e, &mut frame).unwrap();
+            encoder.encode(frame.root, &frame.global, &mut x);
+            for (c, (a, b)) in x.iter().zip(e).enumerate() {
+                assert!((a - b).abs() < 1e-5, "channel {c}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn root_channels_are_in_the_previous_heading_frame() {
+        let [from, to] = [Root { x: 5.0, z: 1.0, yaw: 3.1 }, Root { x: 5.2, z: 0.9, yaw: -3.1 }];
+        let [vx, vz, dyaw] = step(from, to);
+        assert!((dyaw - (std::f32::consts::TAU - 6.2)).abs() < 1e-6, "the short way round, not {dyaw}");
+        let again = from.advanced(vx, vz, dyaw);
+        assert!((again.x - to.x).abs() < 1e-7 && (again.z - to.z).abs() < 1e-7 && (again.yaw - to.yaw).abs() < 1e-6);
+        // One step ahead while facing +X goes along +X.
+        let east = Root { x: 0.0, z: 0.0, yaw: std::f64::consts::FRAC_PI_2 };
+        let ahead = east.advanced(0.0, 1.0, 0.0);
+        assert!((ahead.x - 1.0).abs() < 1e-12 && ahead.z.abs() < 1e-12);
+    }
+
+    #[test]
+    fn ten_minutes_do_not_drift() {
+        let recording = synthetic::walk(18_000);
+        let mut decoder = Decoder::new(Kernels::detect().unwrap(), &recording.rig, RADIUS);
+        decoder.reset(recording.frames[0].root);
+        let mut out = Frame::empty(recording.rig.len());
+        for x in features(&recording.frames) {
+            decoder.decode(&x, &mut out).unwrap();
+        }
+        let last = recording.frames.last().unwrap().root;
+        let off = (out.root.x - last.x).hypot(out.root.z - last.z);
+        assert!(off < 1e-4, "{off} m");
+    }
+
+    #[test]
+    fn heading_of_lying_hips_is_the_one_before() {
+        let lying = Transform { position: Vec3::Y, rotation: Quat::from_rotation_x(-std::f32::consts::FRAC_PI_2) };
+        assert_eq!(root_of(&lying, 0.7).yaw, 0.7);
+        let leaning =
+            Transform { position: Vec3::X, rotation: Quat::from_rotation_y(1.0) * Quat::from_rotation_x(-1.2) };
+        assert!((root_of(&leaning, 0.7).yaw - 1.0).abs() < 1e-6);
+        assert_eq!(root_of(&leaning, 0.7).x, 1.0);
+    }
+
+    #[test]
+    fn refuses_what_is_not_finite_and_goes_on() {
+        let recording = synthetic::walk(2);
+        let x = features(&recording.frames);
+        let mut decoder = Decoder::new(Kernels::detect().unwrap(), &recording.rig, RADIUS);
+        let (mut a, mut b) = (Frame::empty(22), Frame::empty(22));
+        let mut clean = decoder.clone();
+        let mut bad = x[0].clone();
+        bad[100] = f32::NAN;
+        assert_eq!(decoder.decode(&bad, &mut a).unwrap_err().kind(), ErrorKind::State);
+        assert_eq!(a, Frame::empty(22));
+        for x in &x {
+            decoder.decode(x, &mut a).unwrap();
+            clean.decode(x, &mut b).unwrap();
+            assert_eq!(a, b);
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! The computation of a block.
+
+use super::SessionOptions;
+use super::anchor::Anchor;
+use super::inputs::Inputs;
+use super::probe::{Probe, tell};
+use crate::engine::Engine;
+use crate::error::Result;
+use crate::flow::{Condition, Generator, GeneratorOptions, normal};
+use crate::frame::{BLOCK_FRAMES, FPS, Frame, Sampler};
+use crate::kernels::Exec;
+use crate::pose::{self, gaze_score};
+use crate::vae::DecoderState;
+
+/// Where the noise of tokens comes from.
+#[derive(Debug)]
+pub(super) enum Noise {
+    /// From the session's seed.
+    Seeded,
+    /// Given values, `[tokens, latent]`; seeded beyond their end.
+    Given(Vec<f32>),
+}
+
+/// All that changes from block to block.
+pub(super) struct BlockState {
+    exec: Exec,
+    pub(super) inputs: Inputs,
+    generator: Generator,
+    decoder: DecoderState,
+    pub(super) anchor: Anchor,
+    motion: pose::Decoder,
+    head: usize,
+    pub(super) noise: Noise,
+    /// The latent, unstandardised.
+    latent: Vec<f32>,
+    /// Four frames of features; standardised, then not.
+    features: Vec<f32>,
+    pub(super) frames: Vec<Frame>,
+    /// The next block.
+    pub(super) block: u64,
+}
+
+impl BlockState {
+    pub(super) fn new(engine: &Engine, options: &SessionOptions) -> Result<Self> {
+        let mut exec = engine.exec(options.threads)?;
+        let student = engine.student.as_ref().zip(engine.config.student.map(|s| s.tau_history));
+        let generator_options = GeneratorOptions { sampler: options.sampler, dtype: options.cache };
+        let condition = Condition::absent(engine.layout());
+        exec.begin();
+        let generator = Generator::new(&mut exec, &engine.flow, student, &condition, generator_options);
+        exec.end();
+        let mut state = Self {
+            inputs: Inputs::new(engine, options)?,
+            generator,
+            decoder: engine.decoder.state(options.cache),
+            anchor: Anchor::new(engine, options),
+            motion: pose::Decoder::new(engine.kernels, &engine.config.rig, engine.config.pose.radius),
+            head: engine.config.rig.index("head").unwrap_or(0),
+            noise: Noise::Seeded,
+            latent: vec![0.0; engine.config.vae.latent],
+            features: vec![0.0; BLOCK_FRAMES * engine.features()],
+            frames: (0..BLOCK_FRAMES).map(|_| Frame::empty(engine.config.rig.joints.len())).collect(),
+            block: 0,
+            exec,
+        };
+        state.reset(engine, options)?;
+        Ok(state)
+    }
+
+    /// Back to the start: the idle clip as history, the agent where the options put it.
+    pub(super) fn reset(&mut self, engine: &Engine, options: &SessionOptions) -> Result<()> {
+        self.block = 0;
+        self.inputs.reset();
+        self.generator.reset();
+        self.decoder.reset();
+        self.anchor.reset(options.start);
+        self.motion.reset(options.start);
+        let absent = &self.inputs.condition;
+        self.exec.begin();
+        for z in engine.idle.chunks_exact(engine.config.vae.latent) {
+            let noise = &self.noise;
+            self.generator.append(absent, z, |token, eps| noise.fill(options.seed, token, eps));
+            self.latent.copy_from_slice(z);
+            engine.latent.restore(&mut self.latent);
+            engine.decoder.step(&mut self.exec, &mut self.decoder, &self.latent, &mut self.features);
+            self.anchor.remember(&self.features);
+        }
+        self.generator.warm_up(&mut self.exec, &engine.flow, engine.student.as_ref());
+        self.exec.end();
+        Ok(())
+    }
+
+    pub(super) fn supports(&self, sampler: Sampler) -> bool {
+        self.generator.supports(sampler)
+    }
+
+    pub(super) fn cache_bytes(&self) -> usize {
+        self.generator.cache_bytes() + self.decoder.cache_bytes() + self.anchor.cache_bytes()
+    }
+
+    /// Wakes the second thread and sets the floating-point mode; system calls belong here.
+    pub(super) fn begin(&mut self) {
+        self.exec.begin();
+    }
+
+    /// Undoes [`BlockState::begin`].
+    pub(super) fn end(&mut self) {
+        self.exec.end();
+    }
+
+    /// Computes the next block into `frames`. Allocates nothing, takes no lock, makes no system call.
+    pub(super) fn compute(
+        &mut self,
+        engine: &Engine,
+        options: &SessionOptions,
+        mut probe: Option<&mut dyn Probe>,
+    ) -> Result<()> {
+        let (block, root) = (self.block, self.motion.root());
+        self.inputs.prepare(&mut self.exec, engine, block, &root, options.gaze, &mut probe)?;
+
+        let (student, noise) = (engine.student.as_ref(), &self.noise);
+        let mut tap = probe.as_mut().map(|p| |_: usize, x1: &[f32]| p.stage(block, "x1", x1));
+        let z = self.generator.sample(
+            &mut self.exec,
+            &engine.flow,
+            student,
+            options.sampler,
+            options.guidance(engine),
+            &self.inputs.condition,
+            |token, eps| noise.fill(options.seed, token, eps),
+            tap.as_mut().map(|tap| tap as _),
+        );
+        self.latent.copy_from_slice(z);
+        tell(&mut probe, block, "latents", &self.latent);
+
+        engine.latent.restore(&mut self.latent);
+        engine.decoder.step(&mut self.exec, &mut self.decoder, &self.latent, &mut self.features);
+        self.anchor.step(
+            &mut self.exec,
+            engine,
+            &mut self.generator,
+            &mut self.decoder,
+            &self.latent,
+            &mut self.features,
+            &root,
+        );
+        tell(&mut probe, block, "decoded", &self.features);
+
+        engine.pose.restore(&mut self.features);
+        let width = engine.features();
+        for (i, (frame, x)) in self.frames.iter_mut().zip(self.features.chunks_exact(width)).enumerate() {
+            frame.index = block * BLOCK_FRAMES as u64 + i as u64;
+            frame.time = frame.index as f64 / f64::from(FPS);
+            frame.sampler = options.sampler;
+            self.motion.decode(x, frame)?;
+            let head = &frame.global[self.head];
+            frame.gaze = self.inputs.head_at(frame.index).and_then(|user| gaze_score(&engine.config.rig, head, user));
+        }
+        tell_frames(&mut probe, block, &self.frames);
+        self.block += 1;
+        Ok(())
+    }
+}
+
+impl Noise {
+    fn fill(&self, seed: u64, token: u64, eps: &mut [f32]) {
+        match self {
+            Noise::Given(values) => match values.chunks_exact(eps.len()).nth(token as usize) {
+                Some(given) => eps.copy_from_slice(given),
+                None => normal(seed, token, eps),
+            },
+            Noise::Seeded => normal(seed, token, eps),
+        }
+    }
+}
+
+/// Frames as flat arrays; allocates, and only when somebody listens.
+fn tell_frames(probe: &mut Option<&mut dyn Probe>, block: u64, frames: &[Frame]) {
+    if probe.is_none() {
+        return;
+    }
+    let roots: Vec<f32> = frames.iter().flat_map(|f| [f.root.x as f32, f.root.z as f32, f.root.yaw as f32]).collect();
+    let joints = || frames.iter().flat_map(|f| &f.global);
+    let positions: Vec<f32> = joints().flat_map(|t| t.position.to_array()).collect();
+    let rotations: Vec<f32> = joints().flat_map(|t| t.rotation.to_array()).collect();
+    tell(probe, block, "roots", &roots);
+    tell(probe, block, "positions", &positions);
+    tell(probe, block, "rotations", &rotations);
+}

@@ -1,0 +1,217 @@
+//! From what was pushed to the conditioning of a block.
+
+use super::probe::{Probe, tell};
+use super::stats::{Delays, InputStats};
+#[cfg(feature = "tract")]
+use crate::audio::TractEncoder;
+use crate::audio::{AudioBackend, AudioEncoder, Voice};
+use crate::config::Config;
+use crate::engine::Engine;
+use crate::error::Result;
+use crate::flow::Condition;
+use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES, FPS, Root};
+use crate::kernels::Exec;
+use crate::session::SessionOptions;
+use crate::user::{HeadTrack, Presence, UserSample};
+use glam::Vec3;
+
+/// A voice and the encoder that listens to it.
+struct Ear {
+    voice: Voice,
+    encoder: Hearing,
+    features: Vec<f32>,
+    /// Blocks by which it lags.
+    delay: u64,
+    /// Whether the voice was present in the block before.
+    open: bool,
+}
+
+/// The audio encoder on either backend.
+enum Hearing {
+    Kernels(AudioEncoder),
+    #[cfg(feature = "tract")]
+    Tract(TractEncoder),
+}
+
+impl Hearing {
+    fn new(engine: &Engine, backend: AudioBackend) -> Result<Self> {
+        Ok(match backend {
+            AudioBackend::Kernels => Self::Kernels(AudioEncoder::new(&engine.config.audio)?),
+            #[cfg(feature = "tract")]
+            AudioBackend::Tract => Self::Tract(engine.audio_source.tract(&engine.config.audio)?),
+        })
+    }
+
+    fn reset(&mut self) -> Result<()> {
+        match self {
+            Self::Kernels(encoder) => encoder.reset(),
+            #[cfg(feature = "tract")]
+            Self::Tract(encoder) => encoder.reset()?,
+        }
+        Ok(())
+    }
+
+    fn encode(&mut self, exec: &mut Exec, engine: &Engine, samples: &[f32], out: &mut [f32]) -> Result<()> {
+        match self {
+            Self::Kernels(encoder) => encoder.encode(exec, &engine.audio, samples, out),
+            #[cfg(feature = "tract")]
+            Self::Tract(encoder) => encoder.encode(samples, out)?,
+        }
+        Ok(())
+    }
+}
+
+/// All inputs of a session.
+pub(super) struct Inputs {
+    agent: Ear,
+    user: Ear,
+    track: HeadTrack,
+    user_delay: u64,
+    samples: Box<[f32; BLOCK_SAMPLES]>,
+    pub(super) condition: Condition,
+}
+
+impl Ear {
+    fn new(engine: &Engine, options: &SessionOptions, delay: u32) -> Result<Self> {
+        Ok(Self {
+            voice: Voice::new(),
+            encoder: Hearing::new(engine, options.audio)?,
+            features: vec![0.0; BLOCK_FRAMES * engine.config.audio.features],
+            delay: u64::from(delay),
+            open: false,
+        })
+    }
+
+    fn reset(&mut self) {
+        self.voice.reset();
+        self.open = false;
+    }
+
+    /// Features of the sound that `block` may know, or `None` where there is none.
+    fn listen(
+        &mut self,
+        exec: &mut Exec,
+        engine: &Engine,
+        block: u64,
+        samples: &mut [f32; BLOCK_SAMPLES],
+    ) -> Result<Option<&[f32]>> {
+        let Some(heard) = block.checked_sub(self.delay) else { return Ok(None) };
+        if !self.voice.take_block(heard, samples)? {
+            self.open = false;
+            return Ok(None);
+        }
+        if !self.open {
+            self.encoder.reset()?;
+            self.open = true;
+        }
+        self.encoder.encode(exec, engine, &samples[..], &mut self.features)?;
+        Ok(Some(&self.features))
+    }
+}
+
+impl Inputs {
+    pub(super) fn new(engine: &Engine, options: &SessionOptions) -> Result<Self> {
+        Ok(Self {
+            agent: Ear::new(engine, options, engine.config.agent_delay_blocks)?,
+            user: Ear::new(engine, options, engine.config.user_delay_blocks)?,
+            track: HeadTrack::new(),
+            user_delay: u64::from(engine.config.user_delay_blocks),
+            samples: Box::new([0.0; BLOCK_SAMPLES]),
+            condition: Condition::absent(engine.layout()),
+        })
+    }
+
+    pub(super) fn reset(&mut self) {
+        self.agent.reset();
+        self.user.reset();
+        self.track.reset();
+        self.condition.clear();
+    }
+
+    pub(super) fn agent_voice(&mut self) -> &mut Voice {
+        &mut self.agent.voice
+    }
+
+    pub(super) fn user_voice(&mut self) -> &mut Voice {
+        &mut self.user.voice
+    }
+
+    pub(super) fn push_head(&mut self, position: Vec3, time: f64) {
+        self.track.push(position, time);
+    }
+
+    /// World position of the user's head in frame `frame`, as far as it is known at the start of its block.
+    pub(super) fn head_at(&mut self, frame: u64) -> Option<Vec3> {
+        let start = (frame - frame % BLOCK_FRAMES as u64) as f64 / f64::from(FPS);
+        known(self.track.sample(frame as f64 / f64::from(FPS), start))
+    }
+
+    /// Makes the conditioning of `block`, with the agent's root at the end of the block before.
+    pub(super) fn prepare(
+        &mut self,
+        exec: &mut Exec,
+        engine: &Engine,
+        block: u64,
+        root: &Root,
+        gaze: Option<f32>,
+        probe: &mut Option<&mut dyn Probe>,
+    ) -> Result<()> {
+        self.condition.clear();
+        if let Some(features) = self.agent.listen(exec, engine, block, &mut self.samples)? {
+            self.condition.set_agent_voice(features);
+            tell(probe, block, "agent_features", features);
+        }
+        if let Some(features) = self.user.listen(exec, engine, block, &mut self.samples)? {
+            self.condition.set_user_voice(features);
+            tell(probe, block, "user_features", features);
+        }
+        if let Some(positions) = self.user_in_agent_frame(block, root) {
+            self.condition.set_user(&positions);
+            tell(probe, block, "conditioning.user", &positions);
+        }
+        if let Some(target) = gaze {
+            self.condition.set_gaze(target);
+        }
+        Ok(())
+    }
+
+    /// Floor positions `(x, z)` of the user over the four frames that `block` may know, in the agent's frame; `None` when
+    /// the last of them is not known. Unknown earlier ones take the position that follows them.
+    fn user_in_agent_frame(&mut self, block: u64, root: &Root) -> Option<[f32; 8]> {
+        let seen = block.checked_sub(self.user_delay)?;
+        let now = (block * BLOCK_FRAMES as u64) as f64 / f64::from(FPS);
+        let mut samples = [UserSample::default(); BLOCK_FRAMES];
+        self.track.block(seen * BLOCK_FRAMES as u64, now, &mut samples);
+        let mut next = known(samples[BLOCK_FRAMES - 1])?;
+        let mut positions = [0.0; 2 * BLOCK_FRAMES];
+        for (sample, xz) in samples.iter().zip(positions.chunks_exact_mut(2)).rev() {
+            next = known(*sample).unwrap_or(next);
+            let local = root.to_local(next);
+            xz.copy_from_slice(&[local.x, local.z]);
+        }
+        Some(positions)
+    }
+
+    pub(super) fn stats(&self) -> InputStats {
+        InputStats {
+            agent_voice: self.agent.voice.stats(),
+            user_voice: self.user.voice.stats(),
+            head: self.track.stats(),
+        }
+    }
+
+    pub(super) fn delays(&self, config: &Config) -> Delays {
+        let block = 1000.0 * BLOCK_FRAMES as f64 / f64::from(FPS);
+        let lag = |voice: &Voice| 1000.0 * voice.lag_samples() as f64 / f64::from(crate::frame::SAMPLE_RATE);
+        Delays {
+            user_ms: block * f64::from(config.user_delay_blocks),
+            agent_ms: block * f64::from(config.agent_delay_blocks),
+            user_resampler_ms: lag(&self.user.voice),
+            agent_resampler_ms: lag(&self.agent.voice),
+        }
+    }
+}
+
+fn known(sample: UserSample) -> Option<Vec3> {
+    (sample.presence != Presence::Absent).then_some(sample.position)
+}

@@ -1,0 +1,123 @@
+//! What a session is made with.
+
+use crate::audio::AudioBackend;
+use crate::engine::Engine;
+use crate::error::{Error, ErrorKind, Result};
+use crate::flow::Guidance;
+use crate::frame::{Root, Sampler};
+use crate::kernels::KvDtype;
+
+/// When recent motion is encoded anew.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Anchoring {
+    /// As the bundle says.
+    #[default]
+    Bundle,
+    /// Never.
+    Never,
+    /// Every this many blocks (at least 1).
+    Every(u32),
+}
+
+/// Options of a session. Start from `SessionOptions::default()` and change what is needed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SessionOptions {
+    /// Seed of the noise: same seed and same inputs, same bits.
+    pub seed: u64,
+    /// Threads that compute a block, 1 or 2. The result is the same.
+    pub threads: usize,
+    /// Sampler at the start.
+    pub sampler: Sampler,
+    /// Gaze target, -1 to 1, or `None` for free gaze.
+    pub gaze: Option<f32>,
+    /// Guidance weight, 0 to 20; `None` for the bundle's.
+    pub guidance: Option<f32>,
+    /// Gaze guidance weight, 0 to 20; `None` for the bundle's.
+    pub gaze_guidance: Option<f32>,
+    /// Where the agent stands at the start, in the caller's world.
+    pub start: Root,
+    /// Storage of the key-value caches; f16 but for checks of the maths.
+    pub cache: KvDtype,
+    /// When recent motion is encoded anew.
+    pub anchoring: Anchoring,
+    /// What runs the audio encoder.
+    pub audio: AudioBackend,
+}
+
+impl Default for SessionOptions {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            threads: 1,
+            sampler: Sampler::Midpoint(4),
+            gaze: None,
+            guidance: None,
+            gaze_guidance: None,
+            start: Root::default(),
+            cache: KvDtype::F16,
+            anchoring: Anchoring::Bundle,
+            audio: AudioBackend::default(),
+        }
+    }
+}
+
+impl SessionOptions {
+    pub(super) fn check(&self, engine: &Engine) -> Result<()> {
+        check_gaze(self.gaze)?;
+        [self.guidance, self.gaze_guidance].into_iter().flatten().try_for_each(check_guidance)?;
+        if !matches!(self.threads, 1 | 2) {
+            return Err(argument(format!("threads is {}: 1 or 2", self.threads)));
+        }
+        if [self.start.x, self.start.z, self.start.yaw].iter().any(|v| !v.is_finite() || v.abs() > 1e6) {
+            return Err(argument("start: x, z and yaw must be finite and within a million metres"));
+        }
+        if self.anchoring == Anchoring::Every(0) {
+            return Err(argument("anchoring every 0 blocks: use Anchoring::Never"));
+        }
+        match self.sampler {
+            Sampler::Midpoint(1 | 2 | 4) | Sampler::Euler(1..=64) => Ok(()),
+            Sampler::Single if engine.student.is_some() => Ok(()),
+            other => Err(unsupported(other, engine)),
+        }
+    }
+
+    pub(super) fn guidance(&self, engine: &Engine) -> Guidance {
+        let defaults = &engine.config.session;
+        Guidance {
+            weight: self.guidance.unwrap_or(defaults.guidance),
+            gaze: self.gaze_guidance.unwrap_or(defaults.gaze_guidance),
+        }
+    }
+}
+
+pub(super) fn check_gaze(target: Option<f32>) -> Result<()> {
+    match target {
+        Some(g) if !(-1.0..=1.0).contains(&g) => Err(argument(format!("gaze target {g}: -1 to 1, or none"))),
+        _ => Ok(()),
+    }
+}
+
+pub(super) fn check_guidance(weight: f32) -> Result<()> {
+    if (0.0..=20.0).contains(&weight) {
+        return Ok(());
+    }
+    Err(argument(format!("guidance weight {weight}: 0 to 20")))
+}
+
+pub(super) fn unsupported(sampler: Sampler, engine: &Engine) -> Error {
+    argument(match sampler {
+        Sampler::Single if engine.student.is_none() => {
+            "the single-step sampler needs a bundle with a student network; this one has none (see `visavis inspect`)"
+                .to_owned()
+        }
+        Sampler::Single | Sampler::Midpoint(_) => format!("{sampler}: midpoint takes 1, 2 or 4 steps"),
+        Sampler::Euler(n) if (1..=64).contains(&n) => {
+            format!("{sampler}: its flow times have no caches in this session; make a session with that sampler")
+        }
+        Sampler::Euler(_) => format!("{sampler}: Euler takes 1 to 64 steps"),
+    })
+}
+
+fn argument(message: impl Into<String>) -> Error {
+    Error::new(ErrorKind::Argument, message)
+}

@@ -1,0 +1,25 @@
+//! A look at every stage of a block.
+
+/// Receives what the stages of a block compute, in the order of the data flow.
+///
+/// | stage | shape |
+/// |---|---|
+/// | `agent_features`, `user_features` | `[4, audio features]`, absent voices left out |
+/// | `conditioning.user` | `[8]` metres in the agent's frame, left out while unknown |
+/// | `x1` | `[branches, latent]`, once an evaluation |
+/// | `latents` | `[latent]`, standardised |
+/// | `decoded` | `[4, features]`, standardised |
+/// | `roots` | `[4, 3]`: x, z, yaw |
+/// | `positions` | `[4, joints, 3]` |
+/// | `rotations` | `[4, joints, 4]` (x, y, z, w) |
+pub trait Probe {
+    /// One stage of block `block`.
+    fn stage(&mut self, block: u64, name: &'static str, values: &[f32]);
+}
+
+/// Passes a stage on if there is someone to receive it.
+pub(super) fn tell(probe: &mut Option<&mut dyn Probe>, block: u64, name: &'static str, values: &[f32]) {
+    if let Some(probe) = probe {
+        probe.stage(block, name, values);
+    }
+}

@@ -1,0 +1,208 @@
+//! The user's head as it comes from a tracker, at the times the model asks for.
+
+use super::{HOLD_SECONDS, MAX_DISTANCE, TELEPORT_SPEED};
+use crate::frame::{BLOCK_FRAMES, FPS};
+use glam::Vec3;
+
+/// Samples that a [`HeadTrack::new`] keeps: 68 s at 120 Hz.
+const CAPACITY: usize = 8_192;
+/// Shortest time that speeds are judged over, s: what a tracker's jitter makes of two close time stamps is no teleport.
+const SPEED_TIME: f64 = 1.0 / 120.0;
+/// Times further from 0 than this are not believed, s (about 115 days).
+const MAX_TIME: f64 = 1e7;
+
+/// How a position is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Presence {
+    /// Between two samples, or on one.
+    Measured,
+    /// The last sample before, at most half a second old.
+    Held,
+    /// Not known; the position is zero and means nothing.
+    #[default]
+    Absent,
+}
+
+/// Where the user's head is at some time.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct UserSample {
+    /// How the position is known.
+    pub presence: Presence,
+    /// Head position in the world, metres; zero when absent.
+    pub position: Vec3,
+}
+
+/// What became of the samples that were pushed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct TrackStats {
+    /// Taken.
+    pub accepted: u64,
+    /// Ignored: NaN or infinity in the position or the time.
+    pub non_finite: u64,
+    /// Ignored: not later than the sample before.
+    pub out_of_order: u64,
+    /// Ignored: more than 1 km from the origin, or a time of more than 10 million seconds.
+    pub absurd: u64,
+    /// Taken, but too far from the sample before to have walked there; the way between is not filled in.
+    pub teleports: u64,
+    /// Dropped to make room before they were asked for.
+    pub overwritten: u64,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    time: f64,
+    position: Vec3,
+    /// Not reached by walking from the sample before.
+    jump: bool,
+}
+
+/// Timed head positions. Bounded; allocates when made and never after.
+///
+/// Causal: the answer for a frame depends on samples with `time <= now` only, so pushing a whole recording ahead of time
+/// gives what live tracking gives.
+#[derive(Debug)]
+pub struct HeadTrack {
+    /// Ring in order of time; the oldest at `first`.
+    samples: Box<[Sample]>,
+    first: usize,
+    len: usize,
+    /// Latest `now` that was asked for.
+    asked: f64,
+    stats: TrackStats,
+}
+
+impl HeadTrack {
+    /// An empty track for the last 8192 samples (68 s at 120 Hz).
+    pub fn new() -> Self {
+        Self::with_capacity(CAPACITY)
+    }
+
+    /// An empty track for the last `samples` samples (at least 2).
+    pub fn with_capacity(samples: usize) -> Self {
+        let empty = Sample { time: 0.0, position: Vec3::ZERO, jump: false };
+        Self {
+            samples: vec![empty; samples.max(2)].into_boxed_slice(),
+            first: 0,
+            len: 0,
+            asked: f64::NEG_INFINITY,
+            stats: TrackStats::default(),
+        }
+    }
+
+    fn get(&self, i: usize) -> &Sample {
+        &self.samples[(self.first + i) % self.samples.len()]
+    }
+
+    /// Appends a head position (world, metres, within 1 km) at `time` (session time, seconds, later than the one
+    /// before). What does not fit that is ignored and counted, see [`TrackStats`].
+    pub fn push(&mut self, position: Vec3, time: f64) {
+        if !position.is_finite() || !time.is_finite() {
+            self.stats.non_finite += 1;
+            return;
+        }
+        // Squares of absurd positions overflow to infinity, which is refused as well.
+        if position.length_squared() > MAX_DISTANCE * MAX_DISTANCE || time.abs() > MAX_TIME {
+            self.stats.absurd += 1;
+            return;
+        }
+        let mut jump = false;
+        if self.len > 0 {
+            let last = self.get(self.len - 1);
+            if time <= last.time {
+                self.stats.out_of_order += 1;
+                return;
+            }
+            let reach = TELEPORT_SPEED * (time - last.time).max(SPEED_TIME) as f32;
+            jump = position.distance_squared(last.position) > reach * reach;
+        }
+        if self.len == self.samples.len() {
+            // Used up once the sample after it may be the answer.
+            if self.get(1).time > self.asked {
+                self.stats.overwritten += 1;
+            }
+            self.first = (self.first + 1) % self.samples.len();
+            self.len -= 1;
+        }
+        let at = (self.first + self.len) % self.samples.len();
+        self.samples[at] = Sample { time, position, jump };
+        self.len += 1;
+        self.stats.accepted += 1;
+        self.stats.teleports += u64::from(jump);
+    }
+
+    /// The head at `time` (session seconds), as known at `now`: linear between neighbours, both no later than `now`,
+    /// unless they are more than half a second or a teleport apart; else the last one before, for half a second.
+    pub fn sample(&mut self, time: f64, now: f64) -> UserSample {
+        if now > self.asked {
+            self.asked = now;
+        }
+        self.peek(time, now)
+    }
+
+    fn peek(&self, time: f64, now: f64) -> UserSample {
+        let until = time.min(now);
+        let after = self.count(|t| t <= until);
+        if after == 0 || !time.is_finite() || now.is_nan() {
+            return UserSample::default();
+        }
+        let before = self.get(after - 1);
+        if before.time == time {
+            return UserSample { presence: Presence::Measured, position: before.position };
+        }
+        if after < self.len {
+            let next = self.get(after);
+            let gap = next.time - before.time;
+            if next.time <= now && gap <= HOLD_SECONDS && !next.jump {
+                let part = ((time - before.time) / gap) as f32;
+                let position = before.position.lerp(next.position, part);
+                return UserSample { presence: Presence::Measured, position };
+            }
+        }
+        if time - before.time <= HOLD_SECONDS {
+            return UserSample { presence: Presence::Held, position: before.position };
+        }
+        UserSample::default()
+    }
+
+    /// Number of leading samples whose time satisfies `keep`, which holds up to some time.
+    fn count(&self, keep: impl Fn(f64) -> bool) -> usize {
+        let (mut low, mut high) = (0, self.len);
+        while low < high {
+            let middle = low + (high - low) / 2;
+            if keep(self.get(middle).time) {
+                low = middle + 1;
+            } else {
+                high = middle;
+            }
+        }
+        low
+    }
+
+    /// The head in the four frames from `first_frame` on (frame `i` at `i / 30` s), as known at `now` seconds.
+    pub fn block(&mut self, first_frame: u64, now: f64, out: &mut [UserSample; BLOCK_FRAMES]) {
+        for (i, sample) in out.iter_mut().enumerate() {
+            *sample = self.sample((first_frame + i as u64) as f64 / f64::from(FPS), now);
+        }
+    }
+
+    /// Counters since the start.
+    pub fn stats(&self) -> TrackStats {
+        self.stats
+    }
+
+    /// Empty, as when new.
+    pub fn reset(&mut self) {
+        (self.first, self.len, self.asked, self.stats) = (0, 0, f64::NEG_INFINITY, TrackStats::default());
+    }
+}
+
+impl Default for HeadTrack {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+#[path = "track_tests.rs"]
+mod tests;

@@ -1,0 +1,139 @@
+use super::*;
+use proptest::prelude::*;
+
+fn at(x: f32) -> Vec3 {
+    Vec3::new(x, 1.6, 2.0)
+}
+
+fn track(samples: &[(f32, f64)]) -> HeadTrack {
+    let mut track = HeadTrack::new();
+    for &(x, time) in samples {
+        track.push(at(x), time);
+    }
+    track
+}
+
+fn measured(x: f32) -> UserSample {
+    UserSample { presence: Presence::Measured, position: at(x) }
+}
+
+fn held(x: f32) -> UserSample {
+    UserSample { presence: Presence::Held, position: at(x) }
+}
+
+const ABSENT: UserSample = UserSample { presence: Presence::Absent, position: Vec3::ZERO };
+
+#[test]
+fn between_samples_is_linear_and_after_them_held_then_absent() {
+    let mut t = track(&[(0.0, 1.0), (1.0, 1.25)]);
+    assert_eq!(t.sample(0.99, 9.0), ABSENT);
+    assert_eq!(t.sample(1.0, 9.0), measured(0.0));
+    assert_eq!(t.sample(1.125, 9.0), measured(0.5));
+    assert_eq!(t.sample(1.25, 9.0), measured(1.0));
+    assert_eq!(t.sample(1.75, 9.0), held(1.0));
+    assert_eq!(t.sample(1.751, 9.0), ABSENT);
+    assert_eq!(HeadTrack::new().sample(0.0, 0.0), ABSENT);
+    assert_eq!(t.sample(f64::NAN, 9.0), ABSENT);
+    assert_eq!(t.sample(1.2, f64::NAN), ABSENT);
+}
+
+#[test]
+fn gaps_are_held_then_absent() {
+    let mut t = track(&[(0.0, 0.0), (1.0, 0.6), (1.5, 0.7)]);
+    assert_eq!(t.sample(0.4, 2.0), held(0.0));
+    assert_eq!(t.sample(0.55, 2.0), ABSENT);
+    assert_eq!(t.sample(0.6, 2.0), measured(1.0));
+    assert_eq!(t.stats().teleports, 0);
+}
+
+#[test]
+fn teleports_are_counted_and_not_walked() {
+    let mut t = track(&[(0.0, 0.0), (4.0, 0.1), (4.1, 0.2)]);
+    assert_eq!(t.sample(0.05, 1.0), held(0.0));
+    assert_eq!(t.sample(0.1, 1.0), measured(4.0));
+    assert_eq!(t.sample(0.15, 1.0), UserSample { presence: Presence::Measured, position: at(4.0).lerp(at(4.1), 0.5) });
+    assert_eq!(t.stats(), TrackStats { accepted: 3, teleports: 1, ..Default::default() });
+    // 11.9 m/s is running; and 5 mm within 0.1 ms is jitter.
+    assert_eq!(track(&[(0.0, 0.0), (0.119, 0.01), (0.124, 0.0101)]).stats().teleports, 0);
+    assert_eq!(track(&[(0.0, 0.0), (0.121, 0.01)]).stats().teleports, 1);
+}
+
+#[test]
+fn bad_samples_are_counted_and_ignored() {
+    let mut t = track(&[(0.0, 1.0)]);
+    t.push(at(f32::NAN), 1.1);
+    t.push(at(f32::NEG_INFINITY), 1.1);
+    t.push(at(0.0), f64::NAN);
+    t.push(at(0.5), 1.0);
+    t.push(at(0.5), 0.5);
+    t.push(at(1_001.0), 1.1);
+    t.push(at(f32::MAX), 1.1);
+    t.push(at(0.5), 1e9);
+    let want = TrackStats { accepted: 1, non_finite: 3, out_of_order: 2, absurd: 3, ..Default::default() };
+    assert_eq!(t.stats(), want);
+    assert_eq!(t.sample(1.1, 2.0), held(0.0));
+    t.reset();
+    assert_eq!(t.stats(), TrackStats::default());
+    assert_eq!(t.sample(1.0, 2.0), ABSENT);
+}
+
+#[test]
+fn a_full_track_keeps_the_newest() {
+    let mut t = HeadTrack::with_capacity(16);
+    for i in 0..40 {
+        t.push(at(i as f32 * 0.01), f64::from(i) * 0.01);
+        if i < 20 {
+            t.sample(f64::from(i) * 0.01, f64::from(i) * 0.01);
+        }
+    }
+    // Samples 0 to 18 made room after they had been passed; 19 to 23 had not.
+    assert_eq!(t.stats().overwritten, 5);
+    assert_eq!(t.sample(0.39, 1.0), measured(0.39));
+    assert_eq!(t.sample(0.23, 1.0), ABSENT);
+}
+
+#[test]
+fn a_block_is_four_frames() {
+    let samples: Vec<_> = (0..90).map(|i| (i as f32 / 90.0, f64::from(i) / 90.0)).collect();
+    let mut t = track(&samples);
+    let mut out = [ABSENT; 4];
+    t.block(10, 0.5, &mut out);
+    for (i, sample) in out.iter().enumerate() {
+        assert_eq!(sample.presence, Presence::Measured);
+        assert!((sample.position.x - (10 + i) as f32 / 30.0).abs() < 1e-6);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(256))]
+
+    /// Nothing that is later than `now` has a say, and pushing ahead changes nothing.
+    #[test]
+    fn causal(
+        steps in prop::collection::vec((0.001f64..0.8, -3f32..3.0), 1..60),
+        asks in prop::collection::vec((0f64..30.0, 0f64..30.0), 1..20),
+    ) {
+        let mut time = 0.0;
+        let samples: Vec<_> = steps.iter().map(|&(dt, x)| { time += dt; (x, time) }).collect();
+        let mut all = track(&samples);
+        for (ask, now) in asks {
+            let past: Vec<_> = samples.iter().copied().filter(|s| s.1 <= now).collect();
+            prop_assert_eq!(all.sample(ask, now), track(&past).sample(ask, now));
+        }
+    }
+
+    /// Whatever comes in, answers are finite and never further out than what was accepted.
+    #[test]
+    fn answers_are_sane(
+        pushes in prop::collection::vec((any::<[f32; 3]>(), any::<f64>()), 0..40),
+        small in prop::collection::vec(([-5f32..5.0, -5f32..5.0, -5f32..5.0], 0f64..4.0), 0..40),
+        ask in 0f64..5.0,
+    ) {
+        let mut t = HeadTrack::with_capacity(20);
+        for (p, time) in pushes.into_iter().chain(small) {
+            t.push(Vec3::from(p), time);
+        }
+        let s = t.sample(ask, ask);
+        prop_assert!(s.position.is_finite() && s.position.length() <= MAX_DISTANCE + 0.1);
+    }
+}

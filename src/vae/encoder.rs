@@ -1,0 +1,74 @@
+//! The encoder: four frames of pose features in, the mean of their latent out.
+//!
+//! A session needs it to start from the idle clip and to re-anchor; the variance serves training alone and is not read.
+
+use super::stack::{Stack, StackState};
+use crate::bundle::Tensors;
+use crate::config::VaeConfig;
+use crate::error::Result;
+use crate::frame::BLOCK_FRAMES;
+use crate::kernels::{Epilogue, Exec, Kernels, KvDtype, Matrix};
+
+/// Tokens of a block: four frames, `mu` and `sigma`.
+const TOKENS: usize = BLOCK_FRAMES + 2;
+
+/// Weights of the encoder.
+#[derive(Debug)]
+pub struct Encoder {
+    stack: Stack,
+    frame: Matrix,
+    /// Embeddings of the six tokens before the frames are added: slot, and `mu` or `sigma` token where there is one.
+    tokens: Vec<f32>,
+    mu: Matrix,
+}
+
+/// An encoder's streaming state.
+#[derive(Debug)]
+pub struct EncoderState(StackState);
+
+impl Encoder {
+    /// Reads `vae.encoder.*` for poses of `features` channels.
+    ///
+    /// # Errors
+    /// As [`Tensors::f32`].
+    pub fn load(t: &Tensors<'_>, kernels: Kernels, c: &VaeConfig, features: usize) -> Result<Self> {
+        let d = c.width;
+        let mut tokens = t.f32("vae.encoder.slot", &[TOKENS, d])?;
+        let mut learned = t.f32("vae.encoder.mu_token", &[d])?;
+        learned.extend(t.f32("vae.encoder.sigma_token", &[d])?);
+        tokens[BLOCK_FRAMES * d..].iter_mut().zip(learned).for_each(|(token, extra)| *token += extra);
+        t.linear(kernels, "vae.encoder.logvar", c.latent, &[d])?;
+        Ok(Self {
+            stack: Stack::load(t, kernels, c, "vae.encoder", TOKENS)?,
+            frame: t.linear(kernels, "vae.encoder.frame", d, &[features])?,
+            tokens,
+            mu: t.linear(kernels, "vae.encoder.mu", c.latent, &[d])?,
+        })
+    }
+
+    /// Fresh state.
+    pub fn state(&self, dtype: KvDtype) -> EncoderState {
+        EncoderState(self.stack.state(dtype))
+    }
+
+    /// Encodes the next block: `frames` is `[4, features]`, standardised; `mu` becomes `[latent]`, unstandardised.
+    pub fn step(&self, exec: &mut Exec, state: &mut EncoderState, frames: &[f32], mu: &mut [f32]) {
+        let d = self.frame.out_features();
+        state.0.x.copy_from_slice(&self.tokens);
+        exec.linear(&self.frame, frames, BLOCK_FRAMES, &mut state.0.x[..BLOCK_FRAMES * d], Epilogue::Add);
+        let hidden = self.stack.step(exec, &mut state.0);
+        exec.linear(&self.mu, &hidden[BLOCK_FRAMES * d..][..d], 1, mu, Epilogue::Store);
+    }
+}
+
+impl EncoderState {
+    /// Forgets the past.
+    pub fn reset(&mut self) {
+        self.0.reset();
+    }
+
+    /// Bytes of the ring cache.
+    pub fn cache_bytes(&self) -> usize {
+        self.0.cache_bytes()
+    }
+}

@@ -1,0 +1,213 @@
+//! Damaged, foreign and inconsistent bundles.
+
+use super::common::golden_path;
+use safetensors::tensor::TensorView;
+use safetensors::{Dtype, SafeTensors};
+use std::collections::{BTreeMap, HashMap};
+use visavis::bundle::{BundleFile, CONFIG_KEY, Contents};
+use visavis::engine::Engine;
+use visavis::error::{Error, ErrorKind};
+use visavis::session::SessionOptions;
+
+const NAME: &str = "some/bundle.safetensors";
+
+fn tiny_bytes() -> Vec<u8> {
+    std::fs::read(golden_path("tiny.safetensors")).expect("the tiny bundle")
+}
+
+/// A bundle taken apart, to be changed and put together again.
+struct Parts {
+    config: serde_json::Value,
+    tensors: BTreeMap<String, (Dtype, Vec<usize>, Vec<u8>)>,
+}
+
+impl Parts {
+    fn tiny() -> Self {
+        let bytes = tiny_bytes();
+        let (_, header) = SafeTensors::read_metadata(&bytes).unwrap();
+        let config = serde_json::from_str(&header.metadata().as_ref().unwrap()[CONFIG_KEY]).unwrap();
+        let file = SafeTensors::deserialize(&bytes).unwrap();
+        let tensors = file.iter().map(|(n, v)| (n.to_owned(), (v.dtype(), v.shape().to_vec(), v.data().to_vec())));
+        Self { config, tensors: tensors.collect() }
+    }
+
+    fn bytes(&self) -> Vec<u8> {
+        self.bytes_with(Some(self.config.to_string()))
+    }
+
+    fn bytes_with(&self, config: Option<String>) -> Vec<u8> {
+        let views = self.tensors.iter().map(|(n, (dtype, shape, data))| {
+            (n.as_str(), TensorView::new(*dtype, shape.clone(), data).expect("a sound tensor"))
+        });
+        let metadata = config.map(|c| HashMap::from([(CONFIG_KEY.to_owned(), c)]));
+        safetensors::serialize(views, metadata).unwrap()
+    }
+
+    fn f32(&mut self, name: &str, shape: &[usize], value: f32) {
+        let data = value.to_le_bytes().repeat(shape.iter().product());
+        self.tensors.insert(name.to_owned(), (Dtype::F32, shape.to_vec(), data));
+    }
+}
+
+/// The error that loading `bytes` ends with; it names the file.
+fn refused(bytes: Vec<u8>) -> Error {
+    let e = Engine::from_bytes(bytes, NAME).expect_err("must be refused");
+    assert!(e.to_string().starts_with(NAME), "{e}");
+    e
+}
+
+/// Changes the tiny bundle, and expects an error of `kind` that contains `part`.
+fn changed(kind: ErrorKind, part: &str, change: impl FnOnce(&mut Parts)) {
+    let mut parts = Parts::tiny();
+    change(&mut parts);
+    let e = refused(parts.bytes());
+    assert_eq!(e.kind(), kind, "{e}");
+    assert!(e.to_string().contains(part), "expected `{part}`: {e}");
+}
+
+#[test]
+fn the_parts_put_together_again_load() {
+    Engine::from_bytes(Parts::tiny().bytes(), NAME).unwrap();
+}
+
+#[test]
+fn missing_and_empty_files_are_named() {
+    let e = Engine::load("no/such/bundle.safetensors").unwrap_err();
+    assert_eq!(e.kind(), ErrorKind::Io);
+    assert!(e.to_string().starts_with("no/such/bundle.safetensors: "), "{e}");
+    assert_eq!(refused(Vec::new()).kind(), ErrorKind::BundleCorrupt);
+    assert_eq!(Engine::load("src").unwrap_err().kind(), ErrorKind::Io, "a folder");
+}
+
+#[test]
+fn a_bundle_cut_anywhere_is_corrupt() {
+    let bytes = tiny_bytes();
+    let header = 8 + u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+    let around = (0..20).chain(header - 20..header + 20).chain(bytes.len() - 20..bytes.len());
+    for len in around.chain((0..bytes.len()).step_by(1999)) {
+        let e = refused(bytes[..len].to_vec());
+        assert_eq!(e.kind(), ErrorKind::BundleCorrupt, "{len}: {e}");
+    }
+    let longer = [bytes, vec![0; 100]].concat();
+    assert_eq!(refused(longer).kind(), ErrorKind::BundleCorrupt);
+}
+
+#[test]
+fn other_files_are_no_bundles() {
+    for bytes in [&b"RIFF\x24\0\0\0WAVEfmt something"[..], b"{}", &[0xff; 4096], &[0; 4096]] {
+        assert_eq!(refused(bytes.to_vec()).kind(), ErrorKind::BundleCorrupt);
+    }
+    let parts = Parts::tiny();
+    let e = refused(parts.bytes_with(None));
+    assert!(e.kind() == ErrorKind::BundleInvalid && e.to_string().contains("not a Visavis bundle"), "{e}");
+    for config in ["", "{", "[]", "{\"format\":1}", "{\"format\":\"1\"}"] {
+        assert_eq!(refused(parts.bytes_with(Some(config.to_owned()))).kind(), ErrorKind::BundleInvalid, "{config}");
+    }
+}
+
+/// What loads in spite of a flipped bit must still be usable: only finite numbers come out of it.
+fn load_flipped(mut bytes: Vec<u8>, at: usize, bit: u32) -> bool {
+    bytes[at] ^= 1 << bit;
+    let engine = match Engine::from_bytes(bytes, NAME) {
+        Ok(engine) => engine,
+        Err(e) => {
+            let kinds = [ErrorKind::BundleCorrupt, ErrorKind::BundleInvalid, ErrorKind::BundleVersion];
+            assert!(kinds.contains(&e.kind()) && e.to_string().starts_with(NAME), "byte {at}, bit {bit}: {e}");
+            return false;
+        }
+    };
+    let mut session = engine.session(SessionOptions::default()).unwrap();
+    session.push_agent_audio(&[0.25; 6400], 24_000).unwrap();
+    for _ in 0..2 {
+        let frames = session.poll(session.next_due()).unwrap().unwrap();
+        for joint in frames.iter().flat_map(|f| &f.global) {
+            assert!(joint.position.is_finite() && joint.rotation.is_finite(), "byte {at}, bit {bit}");
+        }
+    }
+    true
+}
+
+#[test]
+fn a_flipped_bit_in_the_header_is_an_error_or_harmless() {
+    let bytes = tiny_bytes();
+    let header = 8 + u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+    let flips = (0..64).map(|i| (i / 8, i % 8)).chain((8..header).step_by(41).map(|at| (at, at % 8)));
+    let loaded = flips.map(|(at, bit)| u32::from(load_flipped(bytes.clone(), at, bit as u32))).sum::<u32>();
+    println!("{loaded} headers were still sound");
+}
+
+#[test]
+fn a_flipped_bit_in_the_data_is_an_error_or_harmless() {
+    let bytes = tiny_bytes();
+    let header = 8 + u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+    let flips: Vec<_> = (header..bytes.len()).step_by(997).map(|at| (at | 1, (at / 997 % 8) as u32)).collect();
+    let loaded = flips.iter().filter(|(at, bit)| load_flipped(bytes.clone(), (*at).min(bytes.len() - 1), *bit)).count();
+    println!("{loaded} of {} were still sound", flips.len());
+    assert!(loaded > 0, "most flips change a weight a little");
+}
+
+#[test]
+fn other_versions_say_what_to_do() {
+    changed(ErrorKind::BundleVersion, "update visavis", |p| p.config["format"] = 2.into());
+    changed(ErrorKind::BundleVersion, "export the bundle again", |p| p.config["format"] = 0.into());
+}
+
+#[test]
+fn config_and_tensors_must_agree() {
+    let invalid = ErrorKind::BundleInvalid;
+    changed(invalid, "flow.input.weight is missing", |p| drop(p.tensors.remove("flow.input.weight")));
+    changed(invalid, "student.input.weight is missing", |p| p.tensors.retain(|name, _| !name.starts_with("student.")));
+    changed(invalid, "not part of the network", |p| p.f32("flow.layers.9.qkv.weight", &[2, 2], 0.5));
+    changed(invalid, "not part of the network", |p| p.config["student"] = serde_json::Value::Null);
+    changed(invalid, "vae.encoder.ln_f.bias has shape", |p| p.f32("vae.encoder.ln_f.bias", &[7], 0.5));
+    changed(invalid, "has shape", |p| p.config["flow"]["width"] = 64.into());
+    changed(invalid, "vae.decoder.out.bias is I8", |p| {
+        let (_, shape, _) = p.tensors["vae.decoder.out.bias"].clone();
+        let data = vec![1; shape.iter().product()];
+        p.tensors.insert("vae.decoder.out.bias".to_owned(), (Dtype::I8, shape, data));
+    });
+    changed(invalid, "idle.frames", |p| {
+        let (dtype, shape, data) = p.tensors["idle.frames"].clone();
+        let row = data.len() / shape[0];
+        p.tensors.insert("idle.frames".to_owned(), (dtype, vec![shape[0] - 1, shape[1]], data[row..].to_vec()));
+    });
+    changed(invalid, "stats.pose_std", |p| {
+        let shape = p.tensors["stats.pose_std"].1.clone();
+        p.f32("stats.pose_std", &shape, 0.0);
+    });
+}
+
+#[test]
+fn sizes_out_of_range_are_refused_before_memory_is_taken() {
+    let invalid = ErrorKind::BundleInvalid;
+    changed(invalid, "flow.width", |p| p.config["flow"]["width"] = 1_000_000_000_u64.into());
+    changed(invalid, "flow.heads", |p| p.config["flow"]["heads"] = 0.into());
+    changed(invalid, "vae.window_blocks", |p| p.config["vae"]["window_blocks"] = u32::MAX.into());
+    changed(invalid, "user_delay_blocks", |p| p.config["user_delay_blocks"] = 0.into());
+    changed(invalid, "strides", |p| p.config["audio"]["layers"][0]["stride"] = 4.into());
+    changed(invalid, "parents come before", |p| p.config["rig"]["joints"][3]["parent"] = 7.into());
+    changed(invalid, "cannot be read", |p| p.config["flow"]["width"] = (-1).into());
+    changed(invalid, "cannot be read", |p| drop(p.config.as_object_mut().unwrap().remove("vae")));
+}
+
+#[test]
+fn weights_that_are_not_finite_are_corrupt() {
+    let names: Vec<_> = Parts::tiny().tensors.into_keys().collect();
+    for value in [f32::NAN, f32::INFINITY] {
+        for name in names.iter().step_by(7) {
+            changed(ErrorKind::BundleCorrupt, name, |p| {
+                let shape = p.tensors[name].1.clone();
+                p.f32(name, &shape, value);
+            });
+        }
+    }
+}
+
+#[test]
+fn inspecting_refuses_the_same_containers() {
+    let bytes = tiny_bytes();
+    let contents = |bytes: Vec<u8>| Contents::of(&BundleFile::from_bytes(bytes, NAME));
+    assert!(contents(bytes.clone()).unwrap().to_string().contains("tiny"));
+    let e = contents(bytes[..bytes.len() / 2].to_vec()).unwrap_err();
+    assert!(e.kind() == ErrorKind::BundleCorrupt && e.to_string().starts_with(NAME), "{e}");
+}

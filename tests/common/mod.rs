@@ -1,0 +1,123 @@
+//! What the integration tests share: the tiny bundle, its goldens, and conversations to drive a session with.
+#![allow(dead_code, reason = "each test binary uses a part of it")]
+
+use glam::Vec3;
+use safetensors::{Dtype, SafeTensors};
+use std::path::PathBuf;
+use std::sync::Arc;
+use visavis::engine::Engine;
+use visavis::frame::{BLOCK_FRAMES, FPS, Frame};
+use visavis::session::{Session, SessionOptions};
+
+/// A file of `tests/goldens`.
+pub fn golden_path(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/goldens").join(name)
+}
+
+/// The tiny bundle: the real networks with few channels and random weights.
+pub fn tiny() -> Arc<Engine> {
+    Engine::load(golden_path("tiny.safetensors")).expect("the tiny bundle loads")
+}
+
+/// What PyTorch computed from the tiny bundle (`training/visavis_train/goldens.py`).
+pub struct Golden(Vec<u8>);
+
+impl Golden {
+    pub fn load() -> Self {
+        Self(std::fs::read(golden_path("tiny-golden.safetensors")).expect("the golden file is there"))
+    }
+
+    /// A tensor's shape and values; i16 audio is scaled to 1.
+    pub fn get(&self, name: &str) -> (Vec<usize>, Vec<f32>) {
+        let all = SafeTensors::deserialize(&self.0).expect("the golden file is sound");
+        let view = all.tensor(name).unwrap_or_else(|_| panic!("the golden file has {name}"));
+        let data = view.data();
+        let values = match view.dtype() {
+            Dtype::F32 => data.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect(),
+            Dtype::I16 => data.chunks_exact(2).map(|b| f32::from(i16::from_le_bytes([b[0], b[1]])) / 32768.0).collect(),
+            Dtype::I32 => data.chunks_exact(4).map(|b| i32::from_le_bytes([b[0], b[1], b[2], b[3]]) as f32).collect(),
+            other => panic!("{name} is {other:?}"),
+        };
+        (view.shape().to_vec(), values)
+    }
+
+    pub fn values(&self, name: &str) -> Vec<f32> {
+        self.get(name).1
+    }
+}
+
+/// Largest absolute difference; both must have the same length.
+pub fn max_error(a: &[f32], b: &[f32]) -> f32 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+}
+
+/// Inputs of a conversation.
+#[derive(Clone)]
+pub struct Inputs {
+    pub agent: Vec<f32>,
+    pub user: Vec<f32>,
+    pub rate: u32,
+    pub path: Vec<(f64, Vec3)>,
+}
+
+impl Inputs {
+    /// Two syllable-like voices taking turns and a user who walks around the agent, `seconds` long.
+    pub fn circling(seconds: f64, rate: u32) -> Self {
+        let n = (seconds * f64::from(rate)) as usize;
+        let voice = |pitch: f64, turn: f64| -> Vec<f32> {
+            (0..n)
+                .map(|i| {
+                    let t = i as f64 / f64::from(rate);
+                    let speaks = (t / 3.0 + turn).rem_euclid(2.0) < 1.0;
+                    let level = (std::f64::consts::TAU * 3.7 * t).sin().max(0.0).powi(2);
+                    let tone: f64 =
+                        (1..8).map(|h| (std::f64::consts::TAU * pitch * f64::from(h) * t).sin() / f64::from(h)).sum();
+                    if speaks { (0.2 * level * tone) as f32 } else { 0.0 }
+                })
+                .collect()
+        };
+        let path = (0..(seconds * 90.0) as usize)
+            .map(|i| {
+                let t = i as f64 / 90.0;
+                let a = 0.5 * t;
+                (t, Vec3::new((1.7 * a.sin()) as f32, 1.65, (1.7 * a.cos()) as f32))
+            })
+            .collect();
+        Self { agent: voice(120.0, 0.0), user: voice(190.0, 1.0), rate, path }
+    }
+}
+
+/// Pushes everything at once, then polls `blocks` blocks.
+pub fn run(session: &mut Session, inputs: &Inputs, blocks: usize) -> Vec<Frame> {
+    if !inputs.agent.is_empty() {
+        session.push_agent_audio(&inputs.agent, inputs.rate).expect("agent audio");
+    }
+    if !inputs.user.is_empty() {
+        session.push_user_audio(&inputs.user, inputs.rate).expect("user audio");
+    }
+    for (time, position) in &inputs.path {
+        session.push_user_head(*position, *time).expect("head");
+    }
+    poll_blocks(session, blocks)
+}
+
+/// Polls until `blocks` blocks have come.
+pub fn poll_blocks(session: &mut Session, blocks: usize) -> Vec<Frame> {
+    let mut frames = Vec::new();
+    for _ in 0..blocks {
+        let now = session.next_due();
+        frames.extend_from_slice(session.poll(now).expect("poll").expect("a block is due"));
+    }
+    frames
+}
+
+/// A session of the tiny engine over `inputs`.
+pub fn motion(options: SessionOptions, inputs: &Inputs, blocks: usize) -> Vec<Frame> {
+    run(&mut tiny().session(options).expect("session"), inputs, blocks)
+}
+
+/// Seconds of `blocks` blocks.
+pub fn block_seconds(blocks: usize) -> f64 {
+    (blocks * BLOCK_FRAMES) as f64 / f64::from(FPS)
+}

@@ -1,0 +1,93 @@
+//! A running session computes blocks without allocating: proved with an allocator that counts.
+//!
+//! One test in one binary, so that no other test's thread allocates meanwhile.
+
+mod common;
+
+use common::{Inputs, tiny};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use visavis::frame::Sampler;
+use visavis::session::{Anchoring, SessionOptions};
+
+/// The system's allocator, counting what is asked of it while `WATCH` is set.
+struct Counting;
+
+static WATCH: AtomicBool = AtomicBool::new(false);
+static CALLS: AtomicU64 = AtomicU64::new(0);
+
+fn count() {
+    if WATCH.load(Ordering::Relaxed) {
+        CALLS.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+// SAFETY: every call is passed on unchanged to the system's allocator, which keeps the contract.
+#[allow(unsafe_code, reason = "a global allocator is unsafe by nature")]
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: the caller keeps the contract of `alloc`.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, ptr: *mut u8, layout: Layout) {
+        count();
+        // SAFETY: `ptr` came from `System` with this layout.
+        unsafe { System.dealloc(ptr, layout) }
+    }
+
+    unsafe fn realloc(&self, ptr: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        // SAFETY: `ptr` came from `System` with this layout; the caller keeps the contract of `realloc`.
+        unsafe { System.realloc(ptr, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations(work: impl FnOnce()) -> u64 {
+    CALLS.store(0, Ordering::SeqCst);
+    WATCH.store(true, Ordering::SeqCst);
+    work();
+    WATCH.store(false, Ordering::SeqCst);
+    CALLS.load(Ordering::SeqCst)
+}
+
+/// Every sampler, one and two threads, gaze on and off, sampler changes with their catching up, re-anchoring, voices of
+/// a rate that is resampled: after the first push of each voice, neither pushing nor computing allocates.
+#[test]
+fn a_running_session_does_not_allocate() {
+    assert!(allocations(|| drop(std::hint::black_box(vec![1u8]))) > 0, "the allocator counts");
+    let engine = tiny();
+    let inputs = Inputs::circling(20.0, 48_000);
+    for threads in [1, 2] {
+        let options = SessionOptions { threads, anchoring: Anchoring::Every(10), ..Default::default() };
+        let mut session = engine.session(options).unwrap();
+        let per_block = 6400;
+        let (mut agent, mut user) = (inputs.agent.chunks(per_block), inputs.user.chunks(per_block));
+        let mut path = inputs.path.iter().peekable();
+        session.push_agent_audio(agent.next().unwrap(), inputs.rate).unwrap();
+        session.push_user_audio(user.next().unwrap(), inputs.rate).unwrap();
+
+        let samplers = [Sampler::Midpoint(4), Sampler::Single, Sampler::Midpoint(1), Sampler::Euler(8), Sampler::Midpoint(2)];
+        let calls = allocations(|| {
+            for block in 0..100 {
+                session.set_sampler(samplers[block / 7 % samplers.len()]).unwrap();
+                session.set_gaze((block % 5 > 1).then_some(0.5)).unwrap();
+                let now = session.next_due();
+                while let Some((time, position)) = path.next_if(|(time, _)| *time <= now) {
+                    session.push_user_head(*position, *time).unwrap();
+                }
+                if let (Some(a), Some(u)) = (agent.next(), user.next()) {
+                    session.push_agent_audio(a, inputs.rate).unwrap();
+                    session.push_user_audio(u, inputs.rate).unwrap();
+                }
+                std::hint::black_box(session.poll(now).unwrap().unwrap());
+            }
+        });
+        assert_eq!(calls, 0, "allocations with {threads} threads");
+        assert!(session.stats().anchorings > 0, "re-anchoring was among what ran");
+    }
+}

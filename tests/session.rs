@@ -1,0 +1,249 @@
+//! What a session promises: same bits however inputs come, nothing known before its time, seeds that matter.
+
+mod common;
+
+use common::{Inputs, motion, poll_blocks, run, tiny};
+use glam::Vec3;
+use visavis::error::ErrorKind;
+use visavis::frame::{BLOCK_FRAMES, FPS, Frame, Sampler};
+use visavis::session::{Session, SessionOptions};
+
+const BLOCKS: usize = 30;
+
+fn options() -> SessionOptions {
+    SessionOptions { gaze: Some(0.8), ..Default::default() }
+}
+
+fn inputs() -> Inputs {
+    Inputs::circling(common::block_seconds(BLOCKS), 24_000)
+}
+
+/// Drives a session as an application does: each block's inputs in pieces, interleaved by `order`.
+fn live(session: &mut Session, inputs: &Inputs, piece: usize, order: u32) -> Vec<Frame> {
+    let (mut agent, mut user) = (inputs.agent.chunks(piece), inputs.user.chunks(piece + 7));
+    let mut path = inputs.path.iter().peekable();
+    let (mut sent_agent, mut sent_user, mut frames) = (0, 0, Vec::new());
+    for block in 0..BLOCKS {
+        let start = common::block_seconds(block);
+        let samples = |seconds: f64| (seconds * f64::from(inputs.rate)) as usize;
+        let (agent_needs, user_needs) = (samples(start + common::block_seconds(1)), samples(start));
+        loop {
+            let mut moved = false;
+            for turn in 0..3 {
+                match (turn + order) % 3 {
+                    0 if sent_agent < agent_needs => {
+                        if let Some(chunk) = agent.next() {
+                            session.push_agent_audio(chunk, inputs.rate).unwrap();
+                            sent_agent += chunk.len();
+                            moved = true;
+                        }
+                    }
+                    1 if sent_user < user_needs => {
+                        if let Some(chunk) = user.next() {
+                            session.push_user_audio(chunk, inputs.rate).unwrap();
+                            sent_user += chunk.len();
+                            moved = true;
+                        }
+                    }
+                    2 => {
+                        if let Some((time, position)) = path.next_if(|(time, _)| *time <= start) {
+                            session.push_user_head(*position, *time).unwrap();
+                            moved = true;
+                        }
+                    }
+                    _ => {}
+                }
+            }
+            if !moved {
+                break;
+            }
+        }
+        frames.extend_from_slice(session.poll(start).unwrap().unwrap());
+    }
+    frames
+}
+
+#[test]
+fn chunking_and_interleaving_do_not_change_a_bit() {
+    let (engine, inputs) = (tiny(), inputs());
+    // A voice is absent until its first push; both make their appearance before the first block here.
+    let present = || {
+        let mut session = engine.session(options()).unwrap();
+        session.agent_voice().set_present(true);
+        session.user_voice().set_present(true);
+        session
+    };
+    let whole = run(&mut present(), &inputs, BLOCKS);
+    for (piece, order) in [(1, 0), (13, 1), (240, 2), (800, 0), (5000, 1)] {
+        let frames = live(&mut present(), &inputs, piece, order);
+        assert_eq!(frames.len(), whole.len());
+        for (a, b) in frames.iter().zip(&whole) {
+            // The gaze of a frame is measured against the head as known by then; it does not steer.
+            assert_eq!(
+                (a.root, &a.global, &a.local),
+                (b.root, &b.global, &b.local),
+                "chunks of {piece}, frame {}",
+                a.index
+            );
+        }
+    }
+}
+
+#[test]
+fn chunking_does_not_change_a_bit_when_resampling() {
+    let engine = tiny();
+    let inputs = Inputs::circling(common::block_seconds(BLOCKS), 44_100);
+    let whole = run(&mut engine.session(options()).unwrap(), &inputs, BLOCKS);
+    for piece in [1usize, 441, 3000] {
+        let mut session = engine.session(options()).unwrap();
+        inputs.agent.chunks(piece).for_each(|c| session.push_agent_audio(c, inputs.rate).unwrap());
+        inputs.user.chunks(piece).for_each(|c| session.push_user_audio(c, inputs.rate).unwrap());
+        inputs.path.iter().for_each(|(t, p)| session.push_user_head(*p, *t).unwrap());
+        assert_eq!(poll_blocks(&mut session, BLOCKS), whole, "chunks of {piece}");
+    }
+}
+
+#[test]
+fn same_seed_same_bits_with_one_or_two_threads() {
+    let inputs = inputs();
+    let one = motion(options(), &inputs, BLOCKS);
+    assert_eq!(motion(options(), &inputs, BLOCKS), one);
+    assert_eq!(motion(SessionOptions { threads: 2, ..options() }, &inputs, BLOCKS), one);
+}
+
+#[test]
+fn reset_replays() {
+    let inputs = inputs();
+    let mut session = tiny().session(options()).unwrap();
+    let first = run(&mut session, &inputs, BLOCKS);
+    session.reset().unwrap();
+    assert_eq!(run(&mut session, &inputs, BLOCKS), first);
+}
+
+#[test]
+fn seeds_and_gaze_targets_matter() {
+    let inputs = inputs();
+    let base = motion(options(), &inputs, 8);
+    let differs = |other: SessionOptions| {
+        let frames = motion(other, &inputs, 8);
+        base.iter().zip(&frames).any(|(a, b)| a.global != b.global)
+    };
+    assert!(differs(SessionOptions { seed: 1, ..options() }));
+    assert!(differs(SessionOptions { gaze: Some(0.0), ..options() }));
+    assert!(differs(SessionOptions { gaze: None, ..options() }));
+    assert!(differs(SessionOptions { sampler: Sampler::Midpoint(2), ..options() }));
+    assert!(differs(SessionOptions { guidance: Some(3.0), ..options() }));
+}
+
+/// Changing an input after time t changes no frame before t, and does change something later.
+#[test]
+fn causality() {
+    let inputs = inputs();
+    let base = motion(options(), &inputs, BLOCKS);
+    let cut = 17;
+    let start = common::block_seconds(cut);
+    let sample = (start * f64::from(inputs.rate)) as usize;
+
+    // The agent's own voice is known through its block: a change in block `cut` may show from that block on.
+    let mut agent = inputs.clone();
+    agent.agent[sample..].iter_mut().for_each(|s| *s = 0.3 - *s);
+    // What the user does from the start of block `cut - 1` on may show from block `cut` on.
+    let heard = ((start - common::block_seconds(1)) * f64::from(inputs.rate)) as usize;
+    let mut user = inputs.clone();
+    user.user[heard..].iter_mut().for_each(|s| *s = 0.3 - *s);
+    let mut path = inputs.clone();
+    let seen = start - common::block_seconds(1);
+    path.path.iter_mut().filter(|(t, _)| *t > seen).for_each(|(_, p)| *p += Vec3::new(0.5, 0.0, -0.3));
+
+    for (name, changed) in [("agent voice", agent), ("user voice", user), ("user path", path)] {
+        let frames = motion(options(), &changed, BLOCKS);
+        let first = base.iter().zip(&frames).position(|(a, b)| a.global != b.global || a.root != b.root);
+        assert_eq!(first, Some(cut * BLOCK_FRAMES), "{name}: first frame that changed");
+    }
+}
+
+/// A sampler that rests finds its caches behind and catches up: exactly, as long as it rests less than a window.
+#[test]
+fn switching_samplers_and_back_is_as_if_the_caches_had_been_kept() {
+    let engine = tiny();
+    let inputs = inputs();
+    let frames = |switch_back: usize| {
+        let mut session = engine.session(options()).unwrap();
+        let mut frames = run(&mut session, &inputs, 6);
+        session.set_sampler(Sampler::Single).unwrap();
+        frames.extend(poll_blocks(&mut session, switch_back));
+        session.set_sampler(Sampler::Midpoint(4)).unwrap();
+        frames.extend(poll_blocks(&mut session, 20 - switch_back));
+        frames
+    };
+    for blocks in [1, 3, 12] {
+        let f = frames(blocks);
+        assert!(f.iter().all(|f| f.global.iter().all(|t| t.position.is_finite())));
+        assert_eq!(f[24].sampler, Sampler::Single);
+        assert_eq!(f[24 + 4 * blocks].sampler, Sampler::Midpoint(4));
+    }
+}
+
+#[test]
+fn time_and_frames_are_consecutive() {
+    let mut session = tiny().session(options()).unwrap();
+    assert!(session.poll(0.0).unwrap().is_some());
+    assert!(session.poll(0.1).unwrap().is_none(), "block 1 is due at 0.133 s");
+    let mut frames = Vec::new();
+    while let Some(four) = session.poll(1.0).unwrap() {
+        frames.extend_from_slice(four);
+    }
+    // Blocks 1 to 7 are due by 1.0 s (block 7 at 0.933 s).
+    assert_eq!(frames.len(), 28);
+    for (i, f) in frames.iter().enumerate() {
+        assert_eq!(f.index, i as u64 + 4);
+        assert!((f.time - f.index as f64 / f64::from(FPS)).abs() < 1e-12);
+    }
+    assert_eq!(session.poll(0.5).unwrap_err().kind(), ErrorKind::State);
+    assert_eq!(session.poll(f64::NAN).unwrap_err().kind(), ErrorKind::Argument);
+    assert!(session.poll(1.2).unwrap().is_some(), "a refused call changes nothing");
+}
+
+#[test]
+fn bad_arguments_are_typed_errors_and_change_nothing() {
+    let engine = tiny();
+    let kind = |options: SessionOptions| engine.session(options).err().map(|e| e.kind());
+    assert_eq!(kind(SessionOptions { threads: 0, ..options() }), Some(ErrorKind::Argument));
+    assert_eq!(kind(SessionOptions { threads: 3, ..options() }), Some(ErrorKind::Argument));
+    assert_eq!(kind(SessionOptions { gaze: Some(f32::NAN), ..options() }), Some(ErrorKind::Argument));
+    assert_eq!(kind(SessionOptions { guidance: Some(-1.0), ..options() }), Some(ErrorKind::Argument));
+    assert_eq!(kind(SessionOptions { sampler: Sampler::Midpoint(3), ..options() }), Some(ErrorKind::Argument));
+    assert_eq!(kind(SessionOptions { sampler: Sampler::Euler(0), ..options() }), Some(ErrorKind::Argument));
+
+    let mut session = engine.session(options()).unwrap();
+    assert_eq!(session.set_gaze(Some(2.0)).unwrap_err().kind(), ErrorKind::Argument);
+    assert_eq!(session.set_guidance(1.0, f32::INFINITY).unwrap_err().kind(), ErrorKind::Argument);
+    assert_eq!(session.set_sampler(Sampler::Euler(5)).unwrap_err().kind(), ErrorKind::Argument);
+    assert_eq!(session.push_agent_audio(&[0.0, f32::NAN], 24_000).unwrap_err().kind(), ErrorKind::Audio);
+    assert_eq!(session.push_agent_audio(&[0.0], 0).unwrap_err().kind(), ErrorKind::Audio);
+    assert_eq!(session.options(), &options());
+    session.push_user_head(Vec3::NAN, 0.0).unwrap();
+    assert_eq!(session.stats().inputs.head.non_finite, 1);
+    let plain = engine.session(options()).unwrap().poll(0.0).unwrap().unwrap().to_vec();
+    assert_eq!(session.poll(0.0).unwrap().unwrap(), plain);
+}
+
+#[test]
+fn euler_with_its_own_flow_times() {
+    let options = SessionOptions { sampler: Sampler::Euler(5), ..options() };
+    let mut session = tiny().session(options).unwrap();
+    let frames = run(&mut session, &inputs(), 10);
+    assert_eq!(frames[0].sampler, Sampler::Euler(5));
+    assert!(session.set_sampler(Sampler::Euler(8)).is_ok(), "eighths are always there");
+    assert!(session.set_sampler(Sampler::Euler(5)).is_ok());
+}
+
+#[test]
+fn absent_is_not_silent() {
+    let mut inputs = inputs();
+    inputs.agent.fill(0.0);
+    let silent = motion(options(), &inputs, 8);
+    inputs.agent.clear();
+    let absent = motion(options(), &inputs, 8);
+    assert_ne!(silent[0].global, absent[0].global);
+}

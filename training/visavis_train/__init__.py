@@ -1,0 +1,1 @@
+"""Training of Visavis models: motion features, corpus, networks, training, export."""

@@ -1,0 +1,137 @@
+"""Reading and writing bundles: one safetensors file, the configuration (src/config.rs) as JSON in its metadata."""
+import json
+import os
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from safetensors import safe_open
+from safetensors.torch import save_file
+
+from .nets.audio import AudioEncoder
+from .nets.flow import FlowNet
+from .nets.vae import Vae
+
+FORMAT = 1
+KEY = "visavis"
+
+
+def _rename(name):
+    """Module path -> tensor name of the bundle: attention projections sit directly in the layer."""
+    return name.replace(".attn.", ".")
+
+
+def net_tensors(prefix, net):
+    """Tensors of a network under the bundle's names; convolutions become [out, kernel, in]."""
+    out = {}
+    for name, value in net.state_dict().items():
+        value = value.detach().float()
+        if value.dim() == 3:
+            value = value.permute(0, 2, 1)
+        out[f"{prefix}.{_rename(name)}"] = value.contiguous()
+    return out
+
+
+def load_net(prefix, net, tensors):
+    """Fills a network from a bundle's tensors (f16 is widened)."""
+    state = {}
+    for name, value in net.state_dict().items():
+        key = f"{prefix}.{_rename(name)}"
+        if key not in tensors:
+            raise KeyError(f"the bundle lacks {key}")
+        t = tensors[key].float()
+        t = t.permute(0, 2, 1) if value.dim() == 3 else t
+        if t.shape != value.shape:
+            raise ValueError(f"{key} has shape {tuple(t.shape)}, the configuration asks for {tuple(value.shape)}")
+        state[name] = t
+    net.load_state_dict(state)
+    return net.eval()
+
+
+def write(path, tensors, config, half=False):
+    """Writes beside `path` and renames, so that a reader never sees half a file."""
+    dtype = torch.float16 if half else torch.float32
+    tensors = {k: v.detach().to(dtype).contiguous().clone() for k, v in tensors.items()}
+    bad = [k for k, v in tensors.items() if not torch.isfinite(v).all()]
+    if bad:
+        raise ValueError(f"not finite: {', '.join(bad)}")
+    temporary = f"{path}.tmp"
+    save_file(tensors, temporary, metadata={KEY: json.dumps(config)})
+    os.replace(temporary, path)
+
+
+@dataclass
+class Bundle:
+    config: dict
+    tensors: dict
+    audio: AudioEncoder
+    vae: Vae
+    flow: FlowNet
+    student: FlowNet | None
+
+    def stat(self, name):
+        return self.tensors[f"stats.{name}"].float()
+
+    @property
+    def joints(self):
+        return len(self.config["rig"]["joints"])
+
+    def standardise(self, x):
+        return (x - self.stat("pose_mean")) / self.stat("pose_std")
+
+    def unstandardise(self, x):
+        return x * self.stat("pose_std") + self.stat("pose_mean")
+
+    def encode(self, x):
+        """Feature vectors [B, 4 K, F] in metres -> standardised latents [B, K, Dz]."""
+        return (self.vae.encoder(self.standardise(x))[0] - self.stat("latent_mean")) / self.stat("latent_std")
+
+    def decode(self, z):
+        """Standardised latents [B, K, Dz] -> standardised frames [B, 4 K, F]."""
+        return self.vae.decoder(z * self.stat("latent_std") + self.stat("latent_mean"))
+
+    def idle(self):
+        return self.tensors["idle.frames"].float()
+
+
+def flow_from(config, latent, audio_features):
+    keys = ("layers", "width", "heads", "mlp", "tau_width", "window_blocks", "embed_latent", "embed_user", "embed_voice", "embed_gaze", "user_scale")
+    return FlowNet(latent, audio_features, **{k: config[k] for k in keys})
+
+
+def vae_from(config, features):
+    return Vae(features, **{k: config[k] for k in ("latent", "layers", "width", "heads", "mlp", "window_blocks")})
+
+
+def read(path):
+    """Opens a bundle and builds its networks in fp32."""
+    with safe_open(path, framework="pt") as f:
+        config = json.loads(f.metadata()[KEY])
+        tensors = {k: f.get_tensor(k) for k in f.keys()}
+    if config["format"] != FORMAT:
+        raise ValueError(f"{path} has format {config['format']}, this code reads {FORMAT}")
+    features = 3 + 36 * len(config["rig"]["joints"])
+    layers = [tuple(c[k] for k in ("inputs", "outputs", "kernel", "stride", "residual")) for c in config["audio"]["layers"]]
+    audio_features, latent = config["audio"]["features"], config["vae"]["latent"]
+    return Bundle(
+        config, tensors,
+        load_net("audio", AudioEncoder(layers, audio_features), tensors),
+        load_net("vae", vae_from(config["vae"], features), tensors),
+        load_net("flow", flow_from(config["flow"], latent, audio_features), tensors),
+        load_net("student", flow_from(config["flow"], latent, audio_features), tensors) if config.get("student") else None)
+
+
+def make_config(rig, audio_layers, audio_features, vae, flow, *, name, description, licence, student=None, radius=0.1):
+    """The configuration in the shape of src/config.rs. `vae` and `flow` are dicts of their fields."""
+    return {
+        "format": FORMAT, "name": name, "description": description, "licence": licence,
+        "user_delay_blocks": 1, "agent_delay_blocks": 0, "rig": rig, "pose": {"radius": radius},
+        "audio": {"layers": [dict(zip(("inputs", "outputs", "kernel", "stride", "residual"), s)) for s in audio_layers], "features": audio_features},
+        "vae": vae, "flow": flow, "student": student,
+        "session": {"guidance": 1.3, "gaze_guidance": 2.5, "anchor_period": 0, "anchor_radius": 1000.0},
+    }
+
+
+def rig_config(names, parents, offsets, eyes, head_back):
+    joints = [{"name": n, "parent": None if p < 0 else int(p), "offset": [float(v) for v in o]} for n, p, o in zip(names, parents, np.asarray(offsets))]
+    return {"joints": joints, "eyes": [float(v) for v in eyes], "head_back": [float(v) for v in head_back]}

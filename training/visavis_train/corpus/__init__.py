@@ -1,0 +1,1 @@
+"""The conversation corpus: simulated from real parts (see README.md in this folder)."""

@@ -1,0 +1,134 @@
+"""Real takes as clips of their own: the two-person dances (both roles, mirrored) and the walks."""
+import os
+
+import numpy as np
+
+from ..motion import rig
+from ..motion.contacts import lock_feet
+from ..motion.retarget import load_take
+from .signals import FPS, gaussian, minjerk, smooth_noise
+
+# Takes by split; a take, and for walks and speech a person, is in one split only.
+TWO_PERSON = {"train": ["01", "02", "03", "04", "05", "06", "07", "09", "10"], "val": ["11", "12"], "test": ["13", "14"]}
+SIGNALS = {"train": ["basketball_signal_1", "basketball_signal_2", "basketball_signal_3", "basketball_signal_4", "directing_traffic_4"],
+           "val": ["basketball_signal_5"], "test": ["directing_traffic_1"]}
+WALK_TEST, WALK_VAL, WALK_SKIP = {"16", "49"}, {"12", "32"}, {"03"}
+# Dips to the floor, frames of the files at 60 Hz (README of the data)
+LEAVE_OUT = {"60_01": [(701, 914)], "60_02": [(1294, 1383)], "60_11": [(1691, 1745)], "61_11": [(1678, 1757)]}
+SPEED_LIMIT, ACCEL_LIMIT = 9.0, 170.0  # m/s, m/s2 of any joint; frames above are capture errors and split a take
+
+
+def walk_split(name):
+    subject = name.split("_")[0]
+    return "test" if subject in WALK_TEST else "val" if subject in WALK_VAL else "train"
+
+
+def capture_errors(positions):
+    """Frames [T] bool around which a joint moves faster than people do."""
+    v = np.linalg.norm(np.diff(positions, axis=0), axis=-1).max(1) * FPS
+    a = np.linalg.norm(np.diff(positions, 2, axis=0), axis=-1).max(1) * FPS ** 2
+    bad = np.zeros(len(positions), bool)
+    for i in np.concatenate([np.flatnonzero(v > SPEED_LIMIT), np.flatnonzero(a > ACCEL_LIMIT)]):
+        bad[max(0, i - 1): i + 3] = True
+    return bad
+
+
+def signal_takes(data, split, skeleton):
+    folder = os.path.join(data, "motion", "cmu_signals")
+    return [load_take(os.path.join(folder, n + ".txt"), n, skeleton) for n in SIGNALS[split]]
+
+
+def _pieces(bad, least):
+    """Runs of good frames at least `least` long: [(start, end)]."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[1], bad.astype(int), [1]])))
+    return [(a, b) for a, b in edges.reshape(-1, 2) if b - a >= least]
+
+
+def two_person(data, split, least=6.0):
+    """Yields (name, positions, rotations, other head) of good stretches, both roles, mirrored too."""
+    folder = os.path.join(data, "motion", "cmu_two_person")
+    for nn in TWO_PERSON[split]:
+        takes = [load_take(os.path.join(folder, f"{s}_{nn}.bvh"), f"{s}_{nn}") for s in ("60", "61")]
+        n = min(len(t.positions) for t in takes)
+        bad = np.zeros(n, bool)
+        for t in takes:
+            for a, b in LEAVE_OUT.get(t.name, []):
+                bad[a // 2 - 3: b // 2 + 3] = True
+            bad |= capture_errors(t.positions[:n])
+        heads = [t.positions[:, rig.INDEX["head"]] + t.rotations[:, rig.INDEX["head"]] @ rig.EYES for t in takes]
+        for a, b in _pieces(bad, int(least * FPS)):
+            for k in (0, 1):
+                p, r = lock_feet(takes[k].positions[a:b], takes[k].rotations[a:b])
+                u = heads[1 - k][a:b]
+                yield f"{takes[k].name}_{a}", p, r, u
+                mp, mr = rig.mirror(p, r)
+                yield f"{takes[k].name}_{a}_mirror", mp, mr, u * [-1, 1, 1]
+
+
+def head_paths(data, split):
+    """Head paths [n, 3] of the real pairs, for simulated users of the same split."""
+    return [u for name, _, _, u in two_person(data, split, 4.0)]
+
+
+def walk_takes(data, split):
+    """Good stretches of the walks of a split: [(name, positions, rotations)], mirrored ones too."""
+    folder = os.path.join(data, "motion", "cmu_walk")
+    out = []
+    for f in sorted(os.listdir(folder)):
+        name = f[:-4]
+        if not f.endswith(".bvh") or walk_split(name) != split or name.split("_")[0] in WALK_SKIP:
+            continue
+        take = load_take(os.path.join(folder, f), name)
+        bad = capture_errors(take.positions)
+        for a, b in _pieces(bad, 45):
+            out.append((f"{name}_{a}", take.positions[a:b], take.rotations[a:b]))
+            out.append((f"{name}_{a}_mirror", *rig.mirror(take.positions[a:b], take.rotations[a:b])))
+    return out
+
+
+def _pose(p, r):
+    """Joint positions [T, 66] in the heading frame, for matching."""
+    inv = rig.axis_mat("y", -rig.yaw_of(r[:, 0]))
+    return np.einsum("tab,tjb->tja", inv, p - p[:, :1] * [1, 0, 1]).reshape(len(p), -1)
+
+
+def chain(parts, blend=12):
+    """Joins takes [(positions, rotations)] into one: the next starts at its best matching frame of its first third,
+    is laid where the last one ended, and its difference is inertialised away over `blend` frames (Bollo 2018)."""
+    p, r = parts[0]
+    for q, s in parts[1:]:
+        n = max(2, len(q) // 3)
+        here, there = _pose(p[-2:], r[-2:]), _pose(q[:n], s[:n])
+        cost = np.linalg.norm(there[1:] - here[1], axis=1) + 6 * np.linalg.norm(there[1:] - there[:-1] - here[1] + here[0], axis=1)
+        k = int(cost.argmin()) + 1
+        turn = rig.axis_mat("y", rig.yaw_of(r[-1, 0]) - rig.yaw_of(s[k, 0]))
+        q = (q[k:] - q[k, 0] * [1, 0, 1]) @ turn.T + p[-1, 0] * [1, 0, 1]
+        s = turn @ s[k:]
+        local, last = rig.global_to_local(s), rig.global_to_local(r[-1:])
+        fade = 1 - minjerk(np.arange(len(s)) / blend)
+        off = rig.mat_to_rotvec(last[0] @ np.swapaxes(local[0], -1, -2))
+        local = rig.rotvec_to_mat(fade[:, None, None] * off) @ local
+        hips = q[:, 0] + fade[:, None] * (p[-1, 0] - q[0, 0])
+        s = rig.local_to_global(local)
+        p, r = np.concatenate([p, rig.fk_global(hips, s)[1:]]), np.concatenate([r, s[1:]])
+    return p, r
+
+
+def walks(data, split, rng, seconds=30.0):
+    """Yields (name, positions, rotations, user, sources): chained walks of about `seconds`; the user goes ahead of the walker."""
+    takes = walk_takes(data, split)
+    order = rng.permutation(len(takes)).tolist()
+    while order:
+        parts = []
+        while order and sum(len(p) for _, p, _ in parts) < seconds * FPS:
+            parts.append(takes[order.pop()])
+        p, r = chain([(p, r) for _, p, r in parts])
+        p, r = lock_feet(p, r)
+        n = len(p)
+        path = gaussian(p[:, 0], 15)
+        fwd = gaussian(r[:, 0, :, 2] * [1, 0, 1], 20)
+        side = np.stack([fwd[:, 2], 0 * fwd[:, 0], -fwd[:, 0]], 1)
+        gap = rng.uniform(1.2, 2.2) + smooth_noise(rng, n, 5, 0.25)
+        u = path * [1, 0, 1] + rig.unit(fwd) * gap[:, None] + side * smooth_noise(rng, n, 4, 0.25)[:, None]
+        u[:, 1] = rng.uniform(1.45, 1.8) + smooth_noise(rng, n, 0.4, 0.008)
+        yield parts[0][0], p, r, u, ["cmu_walk/" + name for name, _, _ in parts]

@@ -1,0 +1,105 @@
+"""Checkpoints -> one bundle for the runtime.
+
+    python -m visavis_train.export --corpus DIR --audio runs/audio.pt --vae runs/vae.pt --flow runs/flow.pt [--student runs/student.pt] --out B.safetensors [--half]
+
+Averaged (EMA) weights are written. The idle clip, from which sessions start, is the calmest stretch of the corpus: both feet planted, hands
+low and slow, facing the user; turned so that it ends facing +Z (features are relative, so nothing needs turning).
+"""
+import argparse
+
+import numpy as np
+import torch
+
+from . import bundle
+from .motion import rig
+from .nets.audio import AudioEncoder
+from .nets.flow import FlowNet
+from .train.cache import load_audio, load_vae
+from .train.data import clips, expand, load_motion
+from .train.geometry import integrate, local_positions, to_world
+
+LICENCE = ("Weights made from public material: the data used in this project was obtained from mocap.cs.cmu.edu; the database was created with "
+           "funding from NSF EIA-0196217. Voices: LJ Speech (public domain), AMI Corpus (CC BY 4.0), Amazon dyadic calls (Apache-2.0), "
+           "Microsoft speech samples (MIT). The motion capture may not be resold, even in converted form.")
+DESCRIPTION = ("Conversation motion of a standing agent, trained on a corpus simulated from real clips and real speech (no captured conversations). "
+               "Figures measured on it compare models with each other and are not those of the SARAH paper.")
+
+
+def restlessness(frames, roots, n):
+    """How unquiet each window of `n` frames is [T - n + 1]: hand, foot and root speed, hands above the hips, turning."""
+    x = expand(frames)
+    p = to_world(roots.float(), local_positions(x))
+    speed = torch.zeros(len(p), p.shape[1])
+    speed[1:] = p.diff(dim=0).norm(dim=-1) * 30
+    local = local_positions(x)
+    lift = (local[:, [9, 13], 1] - local[:, :1, 1] + 0.02).clamp(min=0).sum(-1)
+    apart = (local[:, [16, 20], 2]).abs().sum(-1)
+    cost = speed[:, [9, 13]].sum(-1) + 4 * speed[:, [16, 20]].sum(-1) + 4 * frames[:, 2].abs() * 30 + 10 * lift + 2 * apart
+    return cost.unfold(0, n, 1).mean(-1)
+
+
+def idle_clip(corpus, split, n, limit=80, known=None):
+    """Feature vectors [n, F] of the calmest stretch, and the name of its clip."""
+    best = (np.inf, None, None)
+    for path in [p for p in clips(corpus, split) if "talk" in p][:limit]:
+        clip, frames, roots, gaze = load_motion(path)
+        cost = restlessness(frames, roots, n) + 0.5 * (1 - gaze.unfold(0, n, 1).mean(-1)).clamp(min=0)
+        at = int(cost[1:].argmin()) + 1
+        if cost[at] < best[0]:
+            best = (float(cost[at]), expand(frames[at:at + n]), f"{path.split('/')[-1]}:{at}")
+    return best[1], best[2]
+
+
+def load_flow(path):
+    state = torch.load(path, weights_only=False)
+    net = FlowNet(state["latent"], state["audio"], **state["size"])
+    net.load_state_dict(state["ema"])
+    return net.eval(), state
+
+
+def assemble(audio, vae_path, flow_path, student_path, idle, name):
+    """Tensors and configuration of a bundle."""
+    vae, mean, std, vae_state = load_vae(vae_path)
+    flow, state = load_flow(flow_path)
+    tensors = {"stats.pose_mean": mean, "stats.pose_std": std, "stats.latent_mean": state["latent_mean"], "stats.latent_std": state["latent_std"],
+               "idle.frames": idle}
+    nets = [("audio", audio), ("vae", vae), ("flow", flow)]
+    student = None
+    if student_path:
+        net, s = load_flow(student_path)
+        nets.append(("student", net))
+        student = {k: s[k] for k in ("tau_history", "guidance", "gaze_guidance")}
+    for prefix, net in nets:
+        tensors |= bundle.net_tensors(prefix, net)
+    rig_json = bundle.rig_config(rig.NAMES, rig.PARENTS, rig.OFFSETS, rig.EYES, rig.HEAD_BACK)
+    config = bundle.make_config(rig_json, audio.spec, audio.out.out_features, vae_state["size"], state["size"], name=name,
+                                description=DESCRIPTION, licence=LICENCE, student=student)
+    return tensors, config
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    for name in ("corpus", "audio", "vae", "flow", "out"):
+        parser.add_argument(f"--{name}", required=True)
+    parser.add_argument("--student")
+    parser.add_argument("--name", default="base")
+    parser.add_argument("--idle-frames", type=int, default=64)
+    parser.add_argument("--idle-from", help="take the idle clip of this bundle")
+    parser.add_argument("--half", action="store_true", help="fp16 weights")
+    args = parser.parse_args()
+    if args.idle_frames % 4:
+        raise SystemExit("--idle-frames must be a multiple of 4")
+    if args.idle_from:
+        idle = bundle.read(args.idle_from).idle()
+    else:
+        idle, where = idle_clip(args.corpus, "train", args.idle_frames)
+        if idle is None:
+            raise SystemExit(f"no conversation clips under {args.corpus}/train")
+        print(f"idle clip from {where}")
+    tensors, config = assemble(load_audio(args.audio), args.vae, args.flow, args.student, idle, args.name)
+    bundle.write(args.out, tensors, config, half=args.half)
+    print(f"{args.out}: {sum(t.numel() for t in tensors.values()) * (2 if args.half else 4) / 1e6:.1f} MB")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,139 @@
+"""Writes what the networks of a bundle compute, stage by stage, for parity tests of the runtime.
+
+    python -m visavis_train.goldens --bundle B.safetensors --out G.safetensors
+
+Everything runs in fp32 from the bundle's file, with every token recomputed at every evaluation (no cache). M idle blocks
+take token indices 0 .. M-1; block k of the session is token M + k. The agent stands at the origin facing +Z in the last idle
+frame. Block 0 has no block before it, so its user position and voice are absent (flag 0); idle tokens have every modality absent.
+Contents (K blocks, T = 4 K frames):
+    agent_voice, user_voice  [N] i16, 24 kHz, value / 32768; silence after the end
+    user_path [T, 3] world;  gaze [1] target;  eps [K, Dz], eps_idle [M, Dz]
+    idle.mu [M, Dz] encoder mean of the idle clip, idle.latents [M, Dz] standardised
+    agent_features, user_features [T, D_a]
+    conditioning.user [K, 8] metres, conditioning.flags [K, 4] of branch F (user, agent voice, user voice, gaze)
+    x1.{k} [NFE, 3 (U, C, F), Dz] of midpoint 4; latents [K, Dz]
+    decoded_frames [n] frame numbers; decoded [n, F] standardised
+    roots [T, 3] (x, z, yaw); positions [T, J, 3]; rotations [T, J, 4] (x, y, z, w) world
+    latents.midpoint2, latents.midpoint1 [K, Dz], with their own history and user in their own agent frame
+    student [K, Dz], student.user [K, 8]: history tau_h z + (1 - tau_h) eps at tau_h = tau_history, new token eps at 0
+    encoder.frames [16, F] metres, encoder.mu, encoder.logvar [4, Dz]
+"""
+import argparse
+
+import numpy as np
+import torch
+from safetensors.torch import save_file
+
+from . import bundle as bundles
+from .motion import features as feat
+from .nets.flow import Condition, absent, cat_conditions
+from .nets.stream import Reference, branches
+from .train.geometry import integrate, to_local
+
+GAZE_TARGET = 0.8
+
+
+def voices(samples, seed):
+    """A buzzing, syllable-like test signal as i16."""
+    r = np.random.default_rng(seed)
+    t = np.arange(samples) / 24000
+    pitch = 120 * (1 + seed % 2) * (1 + 0.2 * np.sin(2 * np.pi * 1.7 * t))
+    phase = 2 * np.pi * np.cumsum(pitch) / 24000
+    tone = sum(np.sin(h * phase) / h for h in range(1, 12))
+    level = np.clip(np.sin(2 * np.pi * (3 + seed % 3) * t), 0, 1) ** 2
+    wave = 0.2 * tone * level + 0.02 * r.standard_normal(samples) * (0.3 + level)
+    return torch.tensor(np.clip(wave * 32767, -32768, 32767).astype(np.int16))
+
+
+def listen(audio, voice, frames):
+    wave = torch.zeros(1, frames * 800)
+    wave[0, :len(voice)] = voice[:frames * 800].float() / 32768
+    return audio(wave)[0]
+
+
+class Session:
+    """Runs a session of the bundle over given inputs with one of its samplers."""
+
+    def __init__(self, b, agent, voice, path, eps, eps_idle, steps=4, student=False):
+        m = len(b.idle()) // 4
+        net, settings = (b.student, b.config["student"]) if student else (b.flow, b.config["session"])
+        reference = Reference(net, settings["guidance"], settings["gaze_guidance"])
+        self.idle = b.encode(b.idle()[None])
+        none = absent(1, m, b.config["audio"]["features"])
+        reference.push(self.idle, eps_idle[None], branches(none, True))
+        root = torch.zeros(1, 3, dtype=torch.float64)
+        z, self.user, self.flags, self.x1, self.roots = [self.idle], [], [], [], []
+        for k in range(len(eps)):
+            block = slice(4 * k, 4 * k + 4)
+            user = to_local(root, path[None, block.start - 4:block.start, [0, 2]].double()).float().reshape(1, 1, 8) if k else torch.zeros(1, 1, 8)
+            heard = voice[block.start - 4:block.start].reshape(1, 1, -1) if k else torch.zeros(1, 1, 4 * voice.shape[1])
+            flags = torch.tensor([[[float(k > 0), 1.0, float(k > 0), 1.0]]])
+            cond = branches(Condition(user, agent[block].reshape(1, 1, -1), heard, torch.full((1, 1, 4), GAZE_TARGET), flags), True)
+            e = eps[None, k:k + 1]
+            if student:
+                new = reference.single(e, cond, settings["tau_history"])
+            else:
+                new, x1 = reference.sample(e, cond, steps)
+                self.x1.append(x1)
+            reference.push(new, e, cond)
+            z.append(new)
+            decoded = b.decode(torch.cat(z, 1))[0, 4 * m:]
+            roots = integrate(b.unstandardise(decoded[block])[None, :, :3].double(), root)
+            root = roots[:, -1]
+            self.user.append(user[0, 0])
+            self.flags.append(flags[0, 0])
+            self.roots.append(roots[0])
+        self.z, self.decoded = torch.cat(z[1:], 1)[0], decoded
+        self.user, self.flags, self.roots = torch.stack(self.user), torch.stack(self.flags), torch.cat(self.roots)
+
+
+@torch.no_grad()
+def compute(b, blocks=20, seed=7):
+    torch.manual_seed(seed)
+    latent, frames, m = b.config["vae"]["latent"], 4 * blocks, len(b.idle()) // 4
+    agent_voice, user_voice = voices(6 * 3200, 2), voices(6 * 3200 - 777, 5)
+    t = torch.arange(frames) / 30
+    path = torch.stack([1.2 * torch.sin(0.8 * t), 1.6 + 0 * t, 1.5 + 0.4 * torch.cos(1.1 * t)], -1)
+    eps, eps_idle = torch.randn(blocks, latent), torch.randn(m, latent)
+    agent, voice = listen(b.audio, agent_voice, frames), listen(b.audio, user_voice, frames)
+    run = lambda **kw: Session(b, agent, voice, path, eps, eps_idle, **kw)
+    main = run()
+    mu, _ = b.vae.encoder(b.standardise(b.idle()[None]))
+    some = torch.tensor([*range(4), *range(frames // 2, frames // 2 + 4), *range(frames - 8, frames)])
+    x = b.unstandardise(main.decoded)
+    pos, quat = feat.from_features(np.concatenate([x[:1].numpy(), x.numpy()]))
+    test = torch.cat([x[-8:], b.idle()[:8]])
+    enc_mu, enc_logvar = b.vae.encoder(b.standardise(test[None]))
+    out = {
+        "agent_voice": agent_voice, "user_voice": user_voice, "user_path": path, "gaze": torch.tensor([GAZE_TARGET]),
+        "eps": eps, "eps_idle": eps_idle, "idle.mu": mu[0], "idle.latents": main.idle[0], "agent_features": agent, "user_features": voice,
+        "conditioning.user": main.user, "conditioning.flags": main.flags, "latents": main.z,
+        "decoded_frames": some.int(), "decoded": main.decoded[some], "roots": main.roots.float(),
+        "positions": torch.tensor(pos[1:]).float(), "rotations": torch.tensor(quat[1:]).float(),
+        "latents.midpoint2": run(steps=2).z, "latents.midpoint1": run(steps=1).z,
+        "encoder.frames": test, "encoder.mu": enc_mu[0], "encoder.logvar": enc_logvar[0],
+    }
+    out |= {f"x1.{k}": x1 for k, x1 in enumerate(main.x1)}
+    if b.student is not None:
+        s = run(student=True)
+        out |= {"student": s.z, "student.user": s.user}
+    return out
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--bundle", required=True)
+    parser.add_argument("--out", required=True)
+    parser.add_argument("--blocks", type=int, default=20)
+    args = parser.parse_args()
+    out = compute(bundles.read(args.bundle), args.blocks)
+    bad = [k for k, v in out.items() if not torch.isfinite(v.float()).all()]
+    if bad:
+        raise SystemExit(f"not finite: {', '.join(bad)}")
+    save_file({k: v.contiguous() for k, v in out.items()}, args.out, metadata={"blocks": str(args.blocks)})
+    for name in ("agent_features", "latents", "decoded", "positions"):
+        print(f"{name}: {tuple(out[name].shape)}, rms {out[name].float().square().mean().sqrt():.3f}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Rig, motion files, retargeting and the feature representation (numpy only)."""

@@ -1,0 +1,1 @@
+"""Networks; file names mirror the Rust modules under src/."""

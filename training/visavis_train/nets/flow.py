@@ -1,0 +1,123 @@
+"""Flow-matching transformer over latents, x1-prediction, SARAH 3.3 (mirrors src/flow)."""
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import nn
+import torch.nn.functional as F
+
+from .layers import ModulatedLayer, band_mask, bias_of, gelu, modulated, rotary
+
+USER, AGENT, VOICE, GAZE = range(4)  # order of the presence flags
+
+
+@dataclass
+class Condition:
+    """Conditioning of K tokens: user [B, K, 8] metres in the agent's frame, agent and voice [B, K, 4 D_a] features
+    (the agent's voice and the user's), gaze [B, K, 4], flags [B, K, 4] of presence."""
+    user: torch.Tensor
+    agent: torch.Tensor
+    voice: torch.Tensor
+    gaze: torch.Tensor
+    flags: torch.Tensor
+
+    def map(self, f):
+        return Condition(f(self.user), f(self.agent), f(self.voice), f(self.gaze), f(self.flags))
+
+    def dropped(self, *which):
+        """The same with the flags of some modalities cleared; all of them without arguments."""
+        flags = self.flags.clone()
+        flags[..., list(which) or slice(None)] = 0
+        return Condition(self.user, self.agent, self.voice, self.gaze, flags)
+
+
+def cat_conditions(parts, dim=0):
+    return Condition(*(torch.cat([getattr(p, n) for p in parts], dim) for n in ("user", "agent", "voice", "gaze", "flags")))
+
+
+def absent(batch, tokens, audio_features):
+    z = torch.zeros
+    return Condition(z(batch, tokens, 8), z(batch, tokens, 4 * audio_features), z(batch, tokens, 4 * audio_features),
+                     z(batch, tokens, 4), z(batch, tokens, 4))
+
+
+def tau_embedding(tau, width):
+    """Sinusoids of 1000 tau, half cosines, half sines: tau [...] -> [..., width]."""
+    half = width // 2
+    freq = torch.exp(-math.log(10000.0) * torch.arange(half, dtype=torch.float32) / half)
+    angle = 1000.0 * tau.float()[..., None] * freq
+    return torch.cat([angle.cos(), angle.sin()], -1)
+
+
+class FlowNet(nn.Module):
+    def __init__(self, latent=64, audio_features=64, layers=4, width=256, heads=4, mlp=4, tau_width=128, window_blocks=48,
+                 embed_latent=128, embed_user=64, embed_voice=64, embed_gaze=16, user_scale=2.0):
+        super().__init__()
+        self.window, self.head_dim, self.heads, self.user_scale = window_blocks, width // heads, heads, user_scale
+        self.tau_width, self.width = tau_width, width
+        self.embed_latent = nn.Linear(latent, embed_latent)
+        self.embed_user = nn.ModuleDict({"0": nn.Linear(8, embed_user), "2": nn.Linear(embed_user, embed_user)})
+        self.embed_agent = nn.Linear(4 * audio_features, embed_voice)
+        self.embed_voice = nn.Linear(4 * audio_features, embed_voice)
+        self.embed_gaze = nn.Linear(4, embed_gaze)
+        self.input = nn.Linear(embed_latent + embed_user + 2 * embed_voice + embed_gaze + 4, width)
+        self.tau = nn.ModuleDict({"0": nn.Linear(tau_width, tau_width), "2": nn.Linear(tau_width, tau_width)})
+        self.layers = nn.ModuleList(ModulatedLayer(width, heads, mlp, tau_width) for _ in range(layers))
+        self.final = nn.ModuleDict({"mod": nn.Linear(tau_width, 2 * width), "out": nn.Linear(width, latent)})
+        nn.init.zeros_(self.final["mod"].weight)
+        nn.init.zeros_(self.final["mod"].bias)
+        self.made = {}
+
+    def tau_vector(self, tau):
+        """tau [B, 1 or T] -> c [B, 1 or T, tau_width]."""
+        return self.tau["2"](F.silu(self.tau["0"](tau_embedding(tau, self.tau_width))))
+
+    def conditioning(self, cond):
+        """Everything of the input but the latent: [B, T, ...] concatenated embeddings, each times its flag, then the flags."""
+        flag = [cond.flags[..., i:i + 1] for i in range(4)]
+        user = self.embed_user["2"](gelu(self.embed_user["0"](cond.user / self.user_scale)))
+        return torch.cat([user * flag[USER], self.embed_agent(cond.agent) * flag[AGENT], self.embed_voice(cond.voice) * flag[VOICE],
+                          self.embed_gaze(cond.gaze) * flag[GAZE], cond.flags], -1)
+
+    def tokens(self, z, conditioning):
+        return self.input(torch.cat([self.embed_latent(z), conditioning.to(z.dtype)], -1))
+
+    def finish(self, x, c):
+        shift, scale = self.final["mod"](F.silu(c)).chunk(2, -1)
+        return self.final["out"](modulated(x, shift, scale))
+
+    def tables(self, count):
+        if count not in self.made:
+            index = torch.arange(count)
+            self.made[count] = (*rotary(index, self.head_dim), bias_of(band_mask(index, self.window)))
+        return self.made[count]
+
+    def forward(self, z, tau, cond):
+        """z [B, T, Dz] at flow times tau [B, 1 or T] -> x1 [B, T, Dz]; token i attends to i - window + 1 .. i."""
+        return self.run(z, tau, self.conditioning(cond), *self.tables(z.shape[1]))
+
+    def run(self, z, tau, conditioning, cos, sin, bias):
+        c = self.tau_vector(tau)
+        x = self.tokens(z, conditioning)
+        for layer in self.layers:
+            x = layer(x, layer.modulation(c), cos, sin, bias)
+        return self.finish(x, c).float()
+
+    def pair_tables(self, count):
+        """Tables for `forward_pair`: `count` history tokens, then `count` current ones of the same positions."""
+        if -count not in self.made:
+            cos, sin = rotary(torch.arange(count), self.head_dim)
+            band = band_mask(torch.arange(count), self.window)
+            before = band & ~torch.eye(count, dtype=torch.bool)
+            mask = torch.cat([torch.cat([band, torch.zeros_like(band)], 1), torch.cat([before, torch.eye(count, dtype=torch.bool)], 1)], 0)
+            self.made[-count] = (torch.cat([cos, cos]), torch.cat([sin, sin]), bias_of(mask))
+        return self.made[-count]
+
+    def forward_pair(self, history, tau_history, z, tau, cond):
+        """x1 of every token at its own flow time over a history at another: history, z [B, T, Dz]; taus [B, 1 or T].
+
+        Row i of the result sees history tokens before i and itself at `tau`: all T blocks of a roll-out at once."""
+        b, t, _ = z.shape
+        taus = torch.cat([tau_history.expand(b, t), tau.expand(b, t)], 1)
+        conditioning = self.conditioning(cond)
+        return self.run(torch.cat([history, z], 1), taus, torch.cat([conditioning, conditioning], 1), *self.pair_tables(t))[:, t:]

@@ -1,0 +1,1 @@
+"""Training loops: audio encoder, VAE, flow, student."""

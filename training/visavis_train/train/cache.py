@@ -1,0 +1,101 @@
+"""Everything the flow trains on, computed once: latents, roots, user, gaze and voice features of each clip.
+
+    python -m visavis_train.train.cache --corpus DIR --vae runs/vae.pt --audio runs/audio.pt --out runs/cache
+
+Writes OUT/{train,val}.pt. Latents are encoded at two phases (frame offsets 4 and 6), so that a window need not start where a clip does.
+"""
+import argparse
+import os
+
+import torch
+
+from ..nets.audio import AudioEncoder
+from ..nets.vae import Vae
+from .data import clips, expand, load_motion
+
+PHASES = (4, 6)
+CHUNK, OVERLAP = 96, 40
+
+
+def load_vae(path):
+    state = torch.load(path, weights_only=False)
+    net = Vae(len(state["mean"]), **state["size"])
+    net.load_state_dict(state["ema"])
+    return net.eval(), state["mean"], state["std"], state
+
+
+def load_audio(path):
+    state = torch.load(path, weights_only=False)
+    net = AudioEncoder(state["spec"], state["features"])
+    net.load_state_dict(state["net"])
+    return net.eval()
+
+
+@torch.no_grad()
+def encode(vae, x):
+    """Standardised frames [4 K, F] -> encoder means [K, Dz], in overlapping chunks."""
+    blocks, out = len(x) // 4, []
+    for start in range(0, blocks, CHUNK):
+        first = max(0, start - OVERLAP)
+        with torch.autocast("cpu", torch.bfloat16):
+            mu = vae.encoder(x[None, 4 * first:4 * min(blocks, start + CHUNK)])[0][0]
+        out.append(mu[start - first:].float())
+    return torch.cat(out)
+
+
+@torch.no_grad()
+def listen(audio, voice, frames, chunk=1500):
+    """i16 samples [800 T] or None -> features [T, D_a] f16."""
+    if voice is None:
+        return torch.zeros(frames, audio.out.out_features, dtype=torch.float16)
+    wave, state = torch.from_numpy(voice).float()[None] / 32768, audio.state()
+    parts = []
+    for part in wave.split(800 * chunk, 1):
+        with torch.autocast("cpu", torch.bfloat16):
+            parts.append(audio(part, state)[0].half())
+    return torch.cat(parts)
+
+
+def features(audio, clip, frames):
+    return {"agent": listen(audio, clip.agent_voice, frames), "voice": listen(audio, clip.user_voice, frames),
+            "has": (clip.agent_voice is not None, clip.user_voice is not None)}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--corpus", required=True)
+    parser.add_argument("--vae", required=True)
+    parser.add_argument("--audio", required=True)
+    parser.add_argument("--out", required=True)
+    parser.add_argument("--waves", action="store_true", help="keep the voices too (i16), for flow training with --end-to-end")
+    parser.add_argument("--threads", type=int, default=1)
+    args = parser.parse_args()
+    torch.set_num_threads(args.threads)
+    vae, mean, std, _ = load_vae(args.vae)
+    audio = load_audio(args.audio)
+    os.makedirs(args.out, exist_ok=True)
+    stats = None
+    for split in ("train", "val"):
+        items = []
+        for path in clips(args.corpus, split):
+            clip, frames, roots, gaze = load_motion(path)
+            if len(frames) < 4 * 12 + 8:
+                continue
+            x = (expand(frames) - mean) / std
+            z = [encode(vae, x[p:p + (len(x) - p) // 4 * 4]) for p in PHASES]
+            item = {"name": os.path.basename(path), "z": z, "roots": roots, "user": torch.from_numpy(clip.user_head.copy()), "gaze": gaze}
+            item |= features(audio, clip, len(frames))
+            if args.waves:
+                item["waves"] = [torch.from_numpy(v.copy()) if v is not None else None for v in (clip.agent_voice, clip.user_voice)]
+            items.append(item)
+        if stats is None:
+            every = torch.cat([i["z"][0] for i in items])
+            stats = every.mean(0), every.std(0).clamp(min=1e-3)
+        for item in items:
+            item["z"] = [(z - stats[0]) / stats[1] for z in item["z"]]
+        torch.save({"items": items, "latent_mean": stats[0], "latent_std": stats[1]}, os.path.join(args.out, split + ".pt"))
+        print(f"{split}: {len(items)} clips, {sum(len(i['gaze']) for i in items) / 108000:.2f} hours", flush=True)
+
+
+if __name__ == "__main__":
+    main()

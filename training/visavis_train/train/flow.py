@@ -1,0 +1,167 @@
+"""Trains the flow network on cached latents (x1-prediction, SARAH 3.3).
+
+    python -m visavis_train.train.flow --cache runs/cache --vae runs/vae.pt --out runs/flow.pt --minutes 50
+
+Two regimes share each batch stream: one flow time for the whole window (imputed history, what the reference sampler does), and
+history near tau = 1 with the current block at its own flow time (what the single-step student starts from). `--end-to-end` goes on
+training an existing flow with the audio encoder unfrozen on raw voices (cache made with --waves).
+"""
+import argparse
+import os
+
+import torch
+from torch import nn
+
+from ..nets.flow import FlowNet
+from . import common
+from .cache import load_audio, load_vae
+from .vae import channel_weights
+from .geometry import ROOT, integrate, local_positions, to_world
+from .windows import Windows
+
+SIZES = {"base": dict(layers=4, width=256, heads=4, mlp=4, tau_width=128, window_blocks=48, embed_latent=128, embed_user=64, embed_voice=96,
+                      embed_gaze=16, user_scale=2.0),
+         "paper": dict(layers=4, width=1024, heads=4, mlp=4, tau_width=256, window_blocks=48, embed_latent=512, embed_user=128, embed_voice=256,
+                       embed_gaze=32, user_scale=2.0)}
+
+
+@torch.no_grad()
+def latent_metric(vae, mean, std, z, latent_mean, latent_std, root=30.0):
+    """How much each direction of a (standardised) latent moves the body: [Dz, Dz], trace Dz.
+
+    Finite differences through the decoder: response of the block's own frames, weighted as in the VAE's loss, and of the world
+    positions after it. A latent's plain squared error would lose the root among the other directions."""
+    w = channel_weights(len(mean)) / 10
+    total = 0
+    for row in z:
+        base = vae.decoder((row * latent_std + latent_mean)[None])[:, -4:]
+        moved = row.repeat(row.shape[-1], 1, 1)
+        moved[:, -1] += 0.1 * torch.eye(row.shape[-1])
+        y = vae.decoder(moved * latent_std + latent_mean)[:, -4:]
+        place = lambda f: to_world(integrate((f * std + mean)[..., :ROOT]), local_positions(f * std + mean)).flatten(1) * root
+        d = torch.cat([((y - base) * w.sqrt()).flatten(1) / (4 * len(mean)) ** 0.5, (place(y) - place(base)) / (4 * 22) ** 0.5], 1)
+        total = total + d @ d.T
+    return total * (len(total) / total.trace())
+
+
+def x1_error(x1, z, metric):
+    """Half plain, half as the body feels it; [B, T]."""
+    d = x1 - z
+    return 0.5 * d.square().mean(-1) + 0.5 * ((d @ metric) * d).mean(-1)
+
+
+def noisy(z, tau, eps):
+    return tau[..., None] * z + (1 - tau[..., None]) * eps
+
+
+def shared_loss(net, z, cond, metric, slip):
+    """Regime of the reference sampler: one flow time a window. `slip` is the deviation of what history adds to the truth."""
+    b = len(z)
+    tau = (torch.arange(b)[:, None] + torch.rand(b, 1)) / b
+    off = torch.randn_like(z) * (slip * torch.rand(b, 1, 1) * (torch.rand(b, 1, 1) < 0.5))
+    with torch.autocast("cpu", torch.bfloat16):
+        x1 = net(noisy(z + off, tau, torch.randn_like(z)), tau, cond)
+    return x1_error(x1, z, metric).mean()
+
+
+def apart_loss(net, z, cond, metric, slip):
+    """Regime of the student: history at tau_h in 0.8 .. 1, each current block at a flow time of its own."""
+    b = len(z)
+    tau_h = 0.8 + 0.2 * torch.rand(b, 1)
+    tau = torch.where(torch.rand(b, 1) < 0.3, torch.zeros(b, 1), torch.rand(b, 1))
+    off = torch.randn_like(z) * (slip * torch.rand(b, 1, 1))
+    with torch.autocast("cpu", torch.bfloat16):
+        x1 = net.forward_pair(noisy(z + off, tau_h, torch.randn_like(z)), tau_h, noisy(z, tau, torch.randn_like(z)), tau, cond)
+    return x1_error(x1, z, metric).mean()
+
+
+@torch.no_grad()
+def validate(net, batches, metric):
+    """x1 error by flow time, conditional against unconditional."""
+    out = {}
+    for name, tau in (("0", 0.0), ("3", 0.375), ("6", 0.75)):
+        errors, free = [], []
+        for z, cond, eps in batches:
+            t = torch.full((len(z), 1), tau)
+            rows = noisy(z, t, eps)
+            errors.append(x1_error(net(rows, t, cond), z, metric)[:, 8:].mean().item())
+            free.append(x1_error(net(rows, t, cond.dropped()), z, metric)[:, 8:].mean().item())
+        out["val" + name], out["free" + name] = sum(errors) / len(errors), sum(free) / len(free)
+    return out
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--cache", required=True)
+    parser.add_argument("--vae", required=True)
+    parser.add_argument("--out", required=True)
+    parser.add_argument("--size", choices=SIZES, default="base")
+    parser.add_argument("--minutes", type=float, default=50)
+    parser.add_argument("--batch", type=int, default=32)
+    parser.add_argument("--blocks", type=int, default=64)
+    parser.add_argument("--lr", type=float, default=1.2e-3)
+    parser.add_argument("--apart", type=float, default=0.35, help="share of time on the regime with history and current apart")
+    parser.add_argument("--slip", type=float, default=0.15)
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--resume", action="store_true")
+    parser.add_argument("--end-to-end", metavar="AUDIO", help="audio checkpoint to train along; needs --init and a cache with voices")
+    parser.add_argument("--init", help="flow checkpoint whose weights to start from")
+    args = parser.parse_args()
+    torch.set_num_threads(args.threads)
+    torch.manual_seed(0)
+    audio = load_audio(args.end_to_end).train() if args.end_to_end else None
+    train = Windows(os.path.join(args.cache, "train.pt"), args.blocks, audio=audio)
+    held = Windows(os.path.join(args.cache, "val.pt"), args.blocks, 0, 0, 0, 0, jitter=False)
+    vae, mean, std, _ = load_vae(args.vae)
+    plain = Windows(os.path.join(args.cache, "train.pt"), 16, jitter=False)
+    metric = latent_metric(vae, mean, std, plain.batch(48)[0], train.mean, train.std)
+    state = torch.load(args.out, weights_only=False) if args.resume else torch.load(args.init, weights_only=False) if args.init else None
+    size = state["size"] if state else SIZES[args.size]
+    latent, width_a = train.items[0]["z"][0].shape[-1], train.items[0]["agent"].shape[-1]
+    net = FlowNet(latent, width_a, **size)
+    parts = nn.ModuleList([net] + ([audio] if audio else []))
+    optim, clock, step = common.optimiser(parts, args.lr), common.Clock(args.minutes), 0
+    if state:
+        net.load_state_dict(state["net"])
+    ema = common.Ema(net, 0.999)
+    if args.resume:
+        optim.load_state_dict(state["optim"])
+        ema.net.load_state_dict(state["ema"])
+        clock, step, ema.steps = common.Clock(args.minutes, state["elapsed"]), state["step"], state["step"]
+    log = common.Log(args.out + ".jsonl", args.resume)
+    torch.manual_seed(1)
+    checks = [(*held.batch(16), torch.randn(16, args.blocks, latent)) for _ in range(3)]
+    torch.manual_seed(2 + step)
+    share = args.apart / (args.apart + 2.2 * (1 - args.apart))  # a step of the pair regime costs about 2.2 of the other
+    seen = {"shared": [], "apart": []}
+
+    def keep():
+        common.save(args.out, net=net.state_dict(), ema=ema.net.state_dict(), optim=optim.state_dict(), size=size, latent=latent, audio=width_a,
+                    latent_mean=train.mean, latent_std=train.std, metric=metric, step=step, elapsed=clock.elapsed)
+        if audio:
+            common.save(args.out + ".audio", net=audio.state_dict(), spec=audio.spec, features=width_a)
+
+    while clock.progress < 1:
+        apart = torch.rand(1).item() < share
+        z, cond = train.batch(args.batch)
+        loss = (apart_loss if apart else shared_loss)(net, z, cond, metric, args.slip)
+        common.set_rate(optim, common.rate(args.lr, step, clock.progress))
+        optim.zero_grad()
+        loss.backward()
+        nn.utils.clip_grad_norm_(parts.parameters(), 1.0)
+        optim.step()
+        ema.update(net)
+        seen["apart" if apart else "shared"].append(loss.item())
+        step += 1
+        if step % 100 == 0:
+            row = {k: sum(v) / len(v) for k, v in seen.items() if v}
+            seen = {"shared": [], "apart": []}
+            log.write(step=step, minutes=clock.elapsed / 60, **row, **(validate(ema.net, checks, metric) if step % 500 == 0 else {}))
+            if step % 500 == 0:
+                keep()
+    log.write(step=step, minutes=clock.elapsed / 60, **validate(ema.net, checks, metric))
+    keep()
+
+
+if __name__ == "__main__":
+    main()

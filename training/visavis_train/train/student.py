@@ -1,0 +1,171 @@
+"""Distils the flow into a network that makes a block in one evaluation (DESIGN 5).
+
+    python -m visavis_train.train.student --cache runs/cache --vae runs/vae.pt --flow runs/flow.pt --out runs/student.pt --minutes 15
+
+The teacher is the reference sampler (midpoint 4, guidance and gaze guidance as at run time) started from the same noise; the student sees its
+history at `tau_history` and must give the teacher's block at once. Histories are real ones and the student's own closed-loop roll-outs, in which
+the user is seen from where the generated body stands. A teacher pass over a window makes a target of every block (`forward_pair`).
+"""
+import argparse
+import os
+
+import torch
+from torch import nn
+
+from ..nets.flow import GAZE, Condition, FlowNet
+from ..nets.stream import DecoderStream, Stream, branches, combine, midpoint
+from . import common
+from .cache import PHASES, load_vae
+from .flow import noisy, x1_error
+from .geometry import integrate, to_local
+from .windows import Windows
+
+
+def pick(c, rows):
+    return c.map(lambda t: t[rows])
+
+
+@torch.no_grad()
+def teach(net, history, eps, cond, gaze, guidance, gaze_guidance, steps=4):
+    """What the reference sampler makes of each block given its history: [B, T, Dz]."""
+    stacked, count = branches(cond, gaze), 3 if gaze else 2
+
+    def evaluate(z, tau, slot):
+        t = torch.full((1, 1), tau)
+        past = noisy(history, t, eps)
+        with torch.autocast("cpu", torch.bfloat16):
+            x1 = net.forward_pair(past.repeat(count, 1, 1), t, z.repeat(count, 1, 1), t, stacked)
+        return combine(x1, count, guidance, gaze_guidance)
+
+    return midpoint(steps, eps, evaluate)
+
+
+class Rollouts:
+    """Closed-loop roll-outs of the student over conditions of the corpus: real latents for `warm` blocks, then its own."""
+
+    def __init__(self, windows, vae, mean, std, warm=16):
+        self.windows, self.decoder, self.mean, self.std, self.warm = windows, vae.decoder, mean, std, warm
+
+    @torch.no_grad()
+    def make(self, net, size, gaze, tau_history):
+        """Latents, noise and conditions of `size` windows."""
+        w, n, warm = self.windows, self.windows.blocks, self.warm
+        picks, cuts, worlds, starts = torch.multinomial(w.weights, size, replacement=True).tolist(), [], [], []
+        for i in picks:
+            item, phase = w.items[i], int(torch.randint(0, len(PHASES), (1,)))
+            at = int(torch.randint(0, len(item["z"][phase]) - n + 1, (1,)))
+            first = PHASES[phase] + 4 * at
+            cuts.append(w.cut(item, phase, at, n))
+            worlds.append(item["user"][first:first + 4 * n].double())
+            starts.append(item["roots"][first + 4 * warm - 1])
+        z, user, agent, voice, g, flags = (torch.stack(c) for c in zip(*cuts))
+        cond = Condition(user.flatten(2), agent, voice, g, flags[:, None].repeat(1, n, 1))
+        cond = targets(cond, gaze)
+        eps, root, worlds = torch.randn_like(z), torch.stack(starts), torch.stack(worlds)
+        stream = Stream(net, size, gaze=gaze, tau_history=tau_history)
+        at = lambda c, k: c.map(lambda t: t[:, k:k + 1])
+        stream.warm(z[:, :warm], eps[:, :warm], cond.map(lambda t: t[:, :warm]))
+        decoder, place = DecoderStream(self.decoder, size), lambda z: z * w.std + w.mean
+        for k in range(warm):
+            decoder.step(place(z[:, k:k + 1]))
+        for k in range(warm, n):
+            cond.user[:, k] = to_local(root, worlds[:, 4 * k - 4:4 * k][..., [0, 2]]).float().flatten(1)
+            new = stream.step(eps[:, k:k + 1], at(cond, k))
+            z[:, k] = new[:, 0]
+            x = decoder.step(place(new)) * self.std + self.mean
+            root = integrate(x[..., :3].double(), root)[:, -1]
+        return z, eps, cond
+
+
+def targets(cond, gaze):
+    """Sets a constant gaze target per sequence, or clears the channel."""
+    if not gaze:
+        return cond.dropped(GAZE)
+    b = len(cond.gaze)
+    wish = torch.where(torch.rand(b, 1, 1) < 0.3, torch.randint(0, 2, (b, 1, 1)).float(), torch.rand(b, 1, 1) * 1.1 - 0.1)
+    flags = cond.flags.clone()
+    flags[..., GAZE] = 1
+    return Condition(cond.user, cond.agent, cond.voice, wish.expand_as(cond.gaze).clone(), flags)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    for name in ("cache", "vae", "flow", "out"):
+        parser.add_argument(f"--{name}", required=True)
+    parser.add_argument("--minutes", type=float, default=15)
+    parser.add_argument("--blocks", type=int, default=64)
+    parser.add_argument("--batch", type=int, default=16)
+    parser.add_argument("--teach", type=int, default=8, help="sequences of a teacher pass")
+    parser.add_argument("--reuse", type=int, default=4, help="student updates for each teacher pass")
+    parser.add_argument("--own", type=float, default=0.5, help="share of teacher passes over the student's own roll-outs")
+    parser.add_argument("--tau-history", type=float, default=0.9)
+    parser.add_argument("--guidance", type=float, default=1.3)
+    parser.add_argument("--gaze-guidance", type=float, default=2.5)
+    parser.add_argument("--lr", type=float, default=4e-4)
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--resume", action="store_true")
+    args = parser.parse_args()
+    torch.set_num_threads(args.threads)
+    torch.manual_seed(3)
+    windows = Windows(os.path.join(args.cache, "train.pt"), args.blocks, 0.03, 0.02, 0, 0.05)
+    vae, mean, std, _ = load_vae(args.vae)
+    base = torch.load(args.flow, weights_only=False)
+    teacher, net = (FlowNet(base["latent"], base["audio"], **base["size"]) for _ in range(2))
+    teacher.load_state_dict(base["ema"])
+    teacher.eval().requires_grad_(False)
+    net.load_state_dict(base["ema"])
+    metric, kept = base["metric"], {k: base[k] for k in ("size", "latent", "audio", "latent_mean", "latent_std", "metric")}
+    optim, ema, clock, step = common.optimiser(net, args.lr), common.Ema(net, 0.998), common.Clock(args.minutes), 0
+    if args.resume:
+        state = torch.load(args.out, weights_only=False)
+        net.load_state_dict(state["net"])
+        ema.net.load_state_dict(state["ema"])
+        optim.load_state_dict(state["optim"])
+        clock, step, ema.steps = common.Clock(args.minutes, state["elapsed"]), state["step"], state["step"]
+    log, rollouts = common.Log(args.out + ".jsonl", args.resume), Rollouts(windows, vae, mean, std)
+    store, losses, own_losses = [], [], []
+
+    def keep():
+        common.save(args.out, net=net.state_dict(), ema=ema.net.state_dict(), optim=optim.state_dict(), step=step, elapsed=clock.elapsed,
+                    tau_history=args.tau_history, guidance=args.guidance, gaze_guidance=args.gaze_guidance, **kept)
+
+    while clock.progress < 1:
+        gaze = bool(torch.rand(1) < 0.6)
+        own = bool(torch.rand(1) < args.own * min(1.0, step / 200))
+        if own:
+            history, eps, cond = rollouts.make(ema.net, args.teach, gaze, args.tau_history)
+        else:
+            history, cond = windows.batch(args.teach)
+            cond, eps = targets(cond, gaze), torch.randn_like(history)
+        wish = teach(teacher, history, eps, cond, gaze, args.guidance, args.gaze_guidance)
+        for row in range(args.teach):
+            store.append((history[row], eps[row], wish[row], pick(cond, row), own))
+        store = store[-800:]
+        for _ in range(args.reuse):
+            fresh = list(range(max(0, len(store) - args.teach), len(store)))
+            rows = (fresh + torch.randint(0, len(store), (args.batch,)).tolist())[:args.batch]
+            h, e, w = (torch.stack([store[i][k] for i in rows]) for k in range(3))
+            c = Condition(*(torch.stack([getattr(store[i][3], n) for i in rows]) for n in ("user", "agent", "voice", "gaze", "flags")))
+            tau = torch.full((1, 1), args.tau_history)
+            with torch.autocast("cpu", torch.bfloat16):
+                x1 = net.forward_pair(noisy(h, tau, e), tau, e, torch.zeros(1, 1), c)
+            error = x1_error(x1, w, metric)[:, 4:].mean(1)
+            loss = error.mean()
+            common.set_rate(optim, common.rate(args.lr, step, clock.progress, 50))
+            optim.zero_grad()
+            loss.backward()
+            nn.utils.clip_grad_norm_(net.parameters(), 1.0)
+            optim.step()
+            ema.update(net)
+            step += 1
+            losses.append(loss.item())
+            own_losses += [v for v, i in zip(error.tolist(), rows) if store[i][4]]
+            if step % 100 == 0:
+                log.write(step=step, minutes=clock.elapsed / 60, loss=sum(losses) / len(losses), own=sum(own_losses) / max(1, len(own_losses)))
+                losses, own_losses = [], []
+                keep()
+    keep()
+
+
+if __name__ == "__main__":
+    main()

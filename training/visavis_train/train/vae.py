@@ -1,0 +1,164 @@
+"""Trains the motion VAE.
+
+    python -m visavis_train.train.vae --corpus DIR --out runs/vae.pt --minutes 25
+
+Loss: standardised features with the root, hands, feet and head weighted up; joint positions in metres after the root is integrated
+over short horizons, their velocity and acceleration (across block borders too), speed of feet that the data keeps planted; KL.
+"""
+import argparse
+import os
+
+import torch
+from torch import nn
+
+from ..nets.vae import Vae
+from . import common
+from .data import Motions, statistics
+from .geometry import FEET, HANDS, ROOT, integrate, local_positions, to_world
+
+SIZES = {"base": dict(latent=64, layers=4, width=192, heads=4, mlp=4, window_blocks=16),
+         "paper": dict(latent=256, layers=9, width=256, heads=4, mlp=4, window_blocks=16)}
+HORIZON = 16
+JOINT_WEIGHTS = {5: 2.0, 8: 1.5, 12: 1.5, 9: 3.0, 13: 3.0, 16: 2.0, 17: 2.0, 20: 2.0, 21: 2.0}
+
+
+def channel_weights(features, root=120.0):
+    joints = (features - ROOT) // 36
+    w = torch.tensor([JOINT_WEIGHTS.get(j, 1.0) for j in range(joints)]).repeat_interleave(36)
+    return torch.cat([torch.full((ROOT,), root), w])
+
+
+def joint_weights(joints):
+    return torch.tensor([JOINT_WEIGHTS.get(j, 1.0) for j in range(joints)])
+
+
+def world(x, horizon):
+    """Feature vectors [B, T, F] -> world positions [B, T / horizon, horizon, J, 3], each stretch from the origin."""
+    x = x.unflatten(1, (-1, horizon))
+    return to_world(integrate(x[..., :ROOT]), local_positions(x))
+
+
+def losses(x, y, mean, std, mu, logvar, weights, jw):
+    """x, y standardised [B, T, F]; returns the parts, already weighted."""
+    feature = ((x - y).square() * weights).mean()
+    p, q = world(x * std + mean, HORIZON), world(y * std + mean, HORIZON)
+    norm = lambda d: ((d.square().sum(-1) + 1e-8).sqrt() * jw).mean()
+    vp, vq = p.diff(dim=2), q.diff(dim=2)
+    feet = list(FEET)
+    planted = (vp[..., feet, :].square().sum(-1) < 0.002 ** 2).float()
+    slide = ((vq[..., feet, :].square().sum(-1) + 1e-8).sqrt() * planted).sum() / (planted.sum() + 1)
+    kl = 0.5 * (mu.square() + logvar.exp() - 1 - logvar).sum(-1).mean()
+    return {"feature": feature, "position": 4 * norm(p - q), "velocity": 20 * norm(vp - vq), "acceleration": 10 * norm(vp.diff(dim=2) - vq.diff(dim=2)),
+            "slide": 5 * slide, "kl": kl}
+
+
+def start_from_principal(net, x, weights):
+    """First and last maps start at the principal components of (weighted) frames: the network begins with the pose basis."""
+    scale = weights.sqrt()
+    _, s, v = torch.linalg.svd((x * scale)[torch.randperm(len(x))[:20000]], full_matrices=False)
+    width = net.encoder.frame.out_features
+    sd, v = s[:width] / min(len(x), 20000) ** 0.5, v[:width]
+    with torch.no_grad():
+        net.encoder.frame.weight[:len(v)] = v * scale / (sd + 0.05)[:, None]
+        net.encoder.frame.bias.zero_()
+        net.decoder.out.weight[:, :len(v)] = (v / scale).T * (sd + 0.01)
+        net.decoder.out.bias.zero_()
+
+
+@torch.no_grad()
+def evaluate(net, x, mean, std):
+    """Reconstruction of standardised x [B, T, F] (from the means): errors in millimetres and degrees, root apart."""
+    y = net(x, noise=False)[0]
+    a, b = x * std + mean, y * std + mean
+    error = (local_positions(a) - local_positions(b)).norm(dim=-1) * 1000
+    ra, rb = integrate(a[..., :ROOT]), integrate(b[..., :ROOT])
+    drift = (ra - rb)[..., :2].norm(dim=-1) * 1000
+    pa, pb = to_world(ra, local_positions(a)), to_world(rb, local_positions(b))
+    feet = list(FEET)
+    va, vb = pa.diff(dim=1)[:, :, feet], pb.diff(dim=1)[:, :, feet]
+    planted = va.norm(dim=-1) < 0.002
+    acc = pb.diff(dim=1).diff(dim=1).norm(dim=-1).mean(-1)
+    border = torch.arange(acc.shape[1]) % 4 >= 2
+    return {"joints_mm": error.mean().item(), "hands_mm": error[..., list(HANDS)].mean().item(), "feet_mm": error[..., feet].mean().item(),
+            "root_step_mm": ((a - b)[..., :2].norm(dim=-1) * 1000).mean().item(), "root_1s_mm": drift[:, 29].mean().item(),
+            "root_end_mm": drift[:, -1].mean().item(), "yaw_end_deg": (ra - rb)[:, -1, 2].abs().mean().item() * 57.3,
+            "slide_mm": (vb.norm(dim=-1)[planted].mean() * 1000).item(), "seam": (acc[:, border].mean() / acc[:, ~border].mean()).item()}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--corpus", required=True)
+    parser.add_argument("--out", required=True)
+    parser.add_argument("--size", choices=SIZES, default="base")
+    parser.add_argument("--minutes", type=float, default=25)
+    parser.add_argument("--batch", type=int, default=16)
+    parser.add_argument("--blocks", type=int, default=32)
+    parser.add_argument("--lr", type=float, default=1.5e-3)
+    parser.add_argument("--kl", type=float, default=2e-5)
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--limit", type=int, help="take at most this many clips")
+    parser.add_argument("--init", help="checkpoint whose weights to start from (schedule starts anew)")
+    parser.add_argument("--resume", action="store_true")
+    args = parser.parse_args()
+    torch.set_num_threads(args.threads)
+    torch.manual_seed(0)
+    train, held = Motions(args.corpus, "train", args.limit), Motions(args.corpus, "val", args.limit)
+    if not train.items:
+        raise SystemExit(f"no clips under {args.corpus}/train: build the corpus first (python -m visavis_train.corpus)")
+    state = torch.load(args.out, weights_only=False) if args.resume else None
+    first = torch.load(args.init, weights_only=False) if args.init else state
+    size = first["size"] if first else SIZES[args.size]
+    if first:
+        mean, std = first["mean"], first["std"]
+        features = len(mean)
+    else:
+        mean, std, every = statistics(train)
+        features = len(mean)
+    net, weights = Vae(features, **size), channel_weights(features)
+    jw = joint_weights((features - ROOT) // 36)
+    jw = jw / jw.mean()
+    if first:
+        net.load_state_dict(first["net"])
+    else:
+        start_from_principal(net, (every - mean) / std, weights)
+        del every
+    optim, ema = common.optimiser(net, args.lr), common.Ema(net, 0.998)
+    clock, step = common.Clock(args.minutes), 0
+    if state:
+        optim.load_state_dict(state["optim"])
+        ema.net.load_state_dict(state["ema"])
+        clock, step, ema.steps = common.Clock(args.minutes, state["elapsed"]), state["step"], state["step"]
+    log, frames = common.Log(args.out + ".jsonl", args.resume), 4 * args.blocks
+    torch.manual_seed(1)
+    check = ((held if held.items else train).sample(32, frames) - mean) / std
+    torch.manual_seed(2 + step)
+    total = {}
+    while clock.progress < 1:
+        x = (train.sample(args.batch, frames) - mean) / std
+        with torch.autocast("cpu", torch.bfloat16):
+            y, mu, logvar = net(x)
+        parts = losses(x, y, mean, std, mu, logvar, weights, jw)
+        loss = sum(v for k, v in parts.items() if k != "kl") + args.kl * parts["kl"]
+        common.set_rate(optim, common.rate(args.lr, step, clock.progress))
+        optim.zero_grad()
+        loss.backward()
+        nn.utils.clip_grad_norm_(net.parameters(), 1.0)
+        optim.step()
+        ema.update(net)
+        step += 1
+        for k, v in parts.items():
+            total[k] = total.get(k, 0) + v.item() / 100
+        if step % 100 == 0:
+            log.write(step=step, minutes=clock.elapsed / 60, **total, **(evaluate(ema.net, check, mean, std) if step % 200 == 0 else {}))
+            total = {}
+        if step % 200 == 0:
+            common.save(args.out, net=net.state_dict(), ema=ema.net.state_dict(), optim=optim.state_dict(), size=size, mean=mean, std=std,
+                        step=step, elapsed=clock.elapsed)
+            train.refresh()
+    log.write(step=step, minutes=clock.elapsed / 60, **evaluate(ema.net, check, mean, std))
+    common.save(args.out, net=net.state_dict(), ema=ema.net.state_dict(), optim=optim.state_dict(), size=size, mean=mean, std=std,
+                step=step, elapsed=clock.elapsed)
+
+
+if __name__ == "__main__":
+    main()

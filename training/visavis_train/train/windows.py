@@ -1,0 +1,85 @@
+"""Windows of the cache as training batches for the flow: latents and conditioning, with modality dropout."""
+import math
+
+import torch
+import torch.nn.functional as F
+
+from ..nets.flow import GAZE, USER, Condition
+from .cache import PHASES
+from .geometry import to_local
+
+
+def smooth(gaze, window):
+    """Centred moving mean over `window` frames of [T]; the ends are held."""
+    if window <= 1:
+        return gaze
+    left = window // 2
+    padded = F.pad(gaze[None, None], (left, window - 1 - left), mode="replicate")
+    return F.avg_pool1d(padded, window, 1)[0, 0]
+
+
+def block_users(roots, user, first, blocks):
+    """Positions [blocks, 8] of block k - 1 in the agent's frame at the last frame of block k - 1; block 0 starts at frame `first` >= 4."""
+    at = torch.arange(first - 4, first - 4 + 4 * blocks).reshape(blocks, 4)
+    return to_local(roots[at[:, -1]], user[at][..., [0, 2]].double()).float()
+
+
+class Windows:
+    """Random windows of `blocks` blocks."""
+
+    def __init__(self, cache, blocks, drop=0.05, drop_all=0.1, drop_gaze=0.35, prefix=0.1, jitter=True, audio=None):
+        state = torch.load(cache, weights_only=False)
+        self.items = [i for i in state["items"] if len(i["z"][-1]) >= blocks]
+        self.mean, self.std, self.blocks = state["latent_mean"], state["latent_std"], blocks
+        self.drop, self.drop_all, self.drop_gaze, self.prefix, self.jitter = drop, drop_all, drop_gaze, prefix, jitter
+        self.weights = torch.tensor([float(len(i["z"][0])) for i in self.items])
+        self.audio = audio
+
+    def one(self, i):
+        item, n = self.items[i], self.blocks
+        phase = int(torch.randint(0, len(PHASES), (1,)))
+        z = item["z"][phase]
+        at = int(torch.randint(0, len(z) - n + 1, (1,)))
+        return self.cut(item, phase, at, n)
+
+    def cut(self, item, phase, at, n):
+        first = PHASES[phase] + 4 * at
+        z = item["z"][phase][at:at + n]
+        user = block_users(item["roots"], item["user"], first, n)
+        frames = slice(first, first + 4 * n)
+        if self.audio is None:
+            agent = item["agent"][frames].float().reshape(n, -1)
+            voice = item["voice"][first - 4:first - 4 + 4 * n].float().reshape(n, -1)
+        else:
+            agent, voice = (self.hear(item, k, s, n) for k, s in ((0, first), (1, first - 4)))
+        kind = int(torch.randint(0, 6, (1,))) if self.jitter else 2
+        gaze = item["gaze"][frames].mean().expand(4 * n) if kind == 5 else smooth(item["gaze"], (1, 30, 60, 60, 120)[kind])[frames]
+        flags = torch.tensor([1.0, *map(float, item["has"]), 1.0])
+        return z, user, agent, voice, gaze.reshape(n, 4), flags
+
+    def hear(self, item, which, start, n, context=8):
+        """Features [n, 4 D_a] straight from the voice, with gradients (end-to-end training)."""
+        wave = item["waves"][which]
+        if wave is None:
+            return torch.zeros(n, 4 * self.audio.out.out_features)
+        lead = min(context, start)
+        part = wave[800 * (start - lead):800 * (start + 4 * n)].float()[None] / 32768
+        return self.audio(part)[0, lead:].float().reshape(n, -1)
+
+    def batch(self, size):
+        """Latents [B, K, Dz] and their Condition with some modalities dropped."""
+        picks = torch.multinomial(self.weights, size, replacement=True).tolist()
+        z, user, agent, voice, gaze, flags = (torch.stack(c) for c in zip(*[self.one(i) for i in picks]))
+        n = self.blocks
+        if self.jitter:
+            turn = (torch.randn(size, 1, 1) * 0.02 + torch.randn(size, n, 1) * 0.02)
+            shift = torch.randn(size, 1, 1, 2) * 0.02 + torch.randn(size, n, 1, 2) * 0.01
+            c, s = turn.cos(), turn.sin()
+            user = torch.stack([c * user[..., 0] + s * user[..., 1], c * user[..., 1] - s * user[..., 0]], -1) + shift
+        flags = flags[:, None].repeat(1, n, 1)
+        keep = (torch.rand(size, 1, 4) >= self.drop).float()
+        keep[..., GAZE] = (torch.rand(size, 1) >= self.drop_gaze).float()
+        keep = keep * (torch.rand(size, 1, 1) >= self.drop_all).float()
+        start = torch.where(torch.rand(size, 1) < self.prefix, torch.randint(1, n, (size, 1)), torch.zeros(size, 1, dtype=torch.long))
+        keep = keep * (torch.arange(n)[None] >= start).float()[..., None]
+        return z, Condition(user.flatten(2), agent, voice, gaze, flags * keep)
