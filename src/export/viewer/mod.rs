@@ -3,7 +3,8 @@
 //! The page (`page/`: markup, style, scripts by job) is compiled in; [`render`] joins it with the recording's data. The file
 //! needs no network and no library, opens from disk, and forbids itself any connection (Content-Security-Policy). Without
 //! WebGL 2 it draws on a 2-D canvas. Options after `#` in its address, joined by `&`, make views repeatable:
-//! `t=12.3` (seconds), `play`, `speed=0.5`, `cam=yaw,pitch,distance` (degrees, degrees, metres; 0 looks the agent in the face),
+//! `t=12.3` (seconds), `play`, `speed=0.5`, `cam=yaw,pitch,distance[,height]` (degrees, degrees, metres, metres; yaw 0 stands on the +Z
+//! side, where a session's agent looks),
 //! `view=user`, `follow=0`, `loop=0`, `theme=dark|light`, `joints`, `clean` (no panels), `fallback` (2-D canvas).
 
 mod data;

@@ -1,20 +1,25 @@
 // Orbit camera: angles about a target that may follow the agent, or the user's own view.
 
 function createCamera(d, view) {
-  const HOME = { yaw: 0.5, pitch: 0.13, distance: 4.3 };
+  const HOME = { yaw: -0.8, pitch: 0.17, distance: 5.3, height: 0.9 };
   const FOV = 0.56;
   const camera = { ...HOME, follow: true, fromUser: false, centre: [0, 0.9, 0] };
 
-  // Mean root within 0.7 s of the moment: follows without shaking, and the same for the same moment.
-  function agentAt(time) {
+  // Mean root within 0.7 s of the moment, drawn towards the user: follows without shaking, and the same for the same moment.
+  function agentAt(time, toUser = 0) {
     const reach = Math.round(0.7 * d.fps), i = Math.round(time * d.fps);
-    const sum = [0, 0];
+    const sum = [0, 0], side = [0, 0];
     let n = 0;
     for (let k = Math.max(0, i - reach); k <= Math.min(d.frames - 1, i + reach); k++, n++) {
       sum[0] += d.root[3 * k];
       sum[1] += d.root[3 * k + 1];
+      if (Number.isNaN(d.user[3 * k])) continue;
+      side[0] += d.user[3 * k] - d.root[3 * k];
+      side[1] += d.user[3 * k + 2] - d.root[3 * k + 1];
     }
-    return n ? [sum[0] / n, 0.9, sum[1] / n] : [0, 0.9, 0];
+    if (!n) return [0, camera.height, 0];
+    const share = Math.min(toUser, 0.7 / Math.max(0.1, Math.hypot(...side) / n));
+    return [(sum[0] + share * side[0]) / n, camera.height, (sum[1] + share * side[1]) / n];
   }
 
   camera.home = () => Object.assign(camera, HOME, { follow: true, fromUser: false });
@@ -33,14 +38,14 @@ function createCamera(d, view) {
 
   // {eye, target, matrix, scale} for a canvas of this size; `inset` is the share of the height that panels cover below.
   camera.at = (time, pose, width, height, inset) => {
-    if (camera.follow) camera.centre = agentAt(time);
+    if (camera.follow) camera.centre = agentAt(time, 0.34 * smoothstep(1.5, 4, camera.distance));
     let target = camera.centre, eye;
-    // A tall window sees less to the sides: step back.
+    // A tall window sees less to the sides, one with high panels less below: step back.
     const aspect = width / Math.max(1, height);
-    const back = camera.distance * Math.max(1, Math.min(1.7, 0.8 / aspect));
+    const back = camera.distance * clamp(0.8 / aspect, 1, 1.7) * clamp(0.78 / (1 - inset), 1, 1.5);
     if (camera.fromUser && pose.user) {
       eye = pose.user;
-      target = add(camera.follow ? agentAt(time) : camera.centre, [0, 0.25, 0]);
+      target = add(agentAt(time), [0, 0.25, 0]);
     } else {
       const flat = back * Math.cos(camera.pitch);
       eye = add(target, [flat * Math.sin(camera.yaw), back * Math.sin(camera.pitch), flat * Math.cos(camera.yaw)]);

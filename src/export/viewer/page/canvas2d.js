@@ -86,7 +86,9 @@ function createCanvas2d(canvas, d, shapes) {
     };
     for (const s of shapes.all) {
       const thin = s.s[0] > 1 ? s.s[0] ** 0.5 : 1;
-      push(scene.pose.carry(s.bone, s.a), scene.pose.carry(s.bone, s.b), s.ra / thin, s.rb / thin, colourOf(s, look));
+      // Discs cannot be cut: hair is moved away from the face instead.
+      const [p, q] = [s.a, s.b].map((x) => (s.cut ? add(x, scale(s.cut, -0.2 * s.ra)) : x));
+      push(scene.pose.carry(s.bone, p), scene.pose.carry(s.bone, q), s.ra / thin, s.rb / thin, colourOf(s, look));
     }
     const { user, eyes } = scene.pose;
     if (user && !scene.fromUser) {

@@ -31,7 +31,7 @@ function createHud(d) {
       for (const who of ["agent", "user"]) {
         const levels = d.speech[who];
         if (!levels) continue;
-        const level = Math.max(...levels.subarray(Math.max(0, i - 4), i + 1));
+        const level = Math.max(...levels.subarray(Math.max(0, i - 9), i + 1));
         flag(`speaks-${who}`, level > 0.06);
         $(`speaks-${who}`).style.setProperty("--level", clamp(levels[i], 0, 1).toFixed(2));
       }

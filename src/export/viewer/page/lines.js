@@ -29,8 +29,8 @@ function sceneLines(d, pose, pieces, options) {
   if (pose.eyes) {
     const c = gazeColour(Number.isNaN(pose.gaze) ? 0 : pose.gaze);
     const start = add(pose.eyes, scale(pose.facing, 0.03));
-    const far = pose.user ? Math.min(2.2, length(sub(pose.user, pose.eyes))) : 1.2;
-    line(start, add(pose.eyes, scale(pose.facing, far)), 0.016, [...c, 0.9], [...c, 0]);
+    const far = options.fromUser ? 0.35 : pose.user ? Math.min(2.2, length(sub(pose.user, pose.eyes))) : 1.2;
+    line(start, add(pose.eyes, scale(pose.facing, far)), 0.011, [...c, 0.9], [...c, 0]);
     if (pose.user && !options.fromUser) dashes(pose.eyes, add(pose.user, scale(unit(sub(pose.eyes, pose.user)), 0.13)), c);
   }
   if (options.joints) {
@@ -52,7 +52,7 @@ function sceneLines(d, pose, pieces, options) {
 
   function dashes(from, to, colour) {
     const n = Math.max(1, Math.round(length(sub(to, from)) / 0.09));
-    for (let k = 2; k < n; k++) line(lerp(from, to, k / n), lerp(from, to, (k + 0.45) / n), 0.009, [...colour, 0.62]);
+    for (let k = 2; k < n; k++) line(lerp(from, to, k / n), lerp(from, to, (k + 0.45) / n), 0.007, [...colour, 0.62]);
   }
 }
 

@@ -133,7 +133,7 @@ function start() {
     pose.update(state.time);
     const clean = page.hasAttribute("data-clean");
     const covered = clean ? 0 : $("transport").offsetHeight / Math.max(1, h);
-    const view = camera.at(state.time, pose, canvas.width, canvas.height, covered * 0.72);
+    const view = camera.at(state.time, pose, canvas.width, canvas.height, covered * 0.95);
     const fromUser = camera.fromUser && pose.user !== null;
     const lines = d.frames ? sceneLines(d, pose, pieces, { fromUser, joints: state.joints }) : [];
     renderer.draw({ pose, view, lines, fromUser, joints: state.joints, theme: theme() });
@@ -151,7 +151,8 @@ function start() {
   const number = (name, fallback) => (options.has(name) && Number.isFinite(Number(options.get(name))) ? Number(options.get(name)) : fallback);
   if (["dark", "light"].includes(options.get("theme"))) page.dataset.theme = options.get("theme");
   const cam = (options.get("cam") ?? "").split(",").map(Number);
-  if (cam.length === 3 && cam.every(Number.isFinite)) {
+  if ((cam.length === 3 || cam.length === 4) && cam.every(Number.isFinite)) {
+    if (cam.length === 4) camera.height = clamp(cam[3], 0, 3);
     Object.assign(camera, { yaw: (cam[0] * Math.PI) / 180, pitch: (clamp(cam[1], -8, 87) * Math.PI) / 180, distance: clamp(cam[2], 0.6, 25) });
   }
   if (options.get("view") === "user") camera.fromUser = true;

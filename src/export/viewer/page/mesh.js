@@ -157,14 +157,15 @@ const emptyMesh = () => ({ vertices: [], indices: [], count: 0 });
 function bodyMesh(d, shapes) {
   const mesh = emptyMesh();
   const parents = d.joints.map((joint) => joint.parent);
-  const { body, head, hair, eyes, leftHand, rightHand } = shapes.parts;
+  const { body, head, hair, eyes, mouth, leftHand, rightHand } = shapes.parts;
   appendSurface(mesh, body, 0.014 * shapes.unit, parents);
   for (const part of [head, hair]) appendSurface(mesh, part, 0.0048 * shapes.unit, parents);
   for (const part of [leftHand, rightHand]) appendSurface(mesh, part, 0.0042 * shapes.unit, parents);
+  appendSurface(mesh, mouth, 0.0026 * shapes.unit, parents);
   for (const eye of eyes) appendSurface(mesh, [eye], 0.003 * shapes.unit, parents);
   // Linear blending thins bent joints: rigid balls inside keep elbows, knees, shoulders and hips full.
   for (const shape of body.filter((s) => s.ball)) {
-    const r = 0.97 * shape.ra;
+    const r = shape.ball * shape.ra;
     appendSurface(mesh, [{ ...shape, b: shape.a, ra: r, rb: r }], 0.012 * shapes.unit, parents);
   }
   return packMesh(mesh);

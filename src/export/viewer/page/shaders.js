@@ -69,7 +69,7 @@ in vec3 vWorld, vNormal, vRest;
 flat in float vTint;
 in float vOcclusion;
 uniform vec3 uEye;
-uniform vec3 uTints[6];
+uniform vec3 uTints[7];
 uniform vec3 uClothes[3];
 uniform vec4 uCloth;
 uniform float uAlpha;
@@ -79,7 +79,7 @@ vec3 dressed() {
   float w = 0.004;
   vec3 c = mix(uClothes[1], uClothes[0], smoothstep(-w, w, vRest.y - uCloth.y));
   c = mix(uClothes[2], c, smoothstep(-w, w, vRest.y - uCloth.x));
-  float skin = max(smoothstep(-w, w, abs(vRest.x) - uCloth.w), smoothstep(-w, w, vRest.y - uCloth.z - 0.2 * abs(vRest.z)) * step(abs(vRest.x), 0.12));
+  float skin = max(smoothstep(-w, w, abs(vRest.x) - uCloth.w), smoothstep(-w, w, vRest.y - uCloth.z - 0.5 * abs(vRest.x) + 0.3 * vRest.z));
   float hem = min(min(abs(vRest.y - uCloth.y), abs(abs(vRest.x) - uCloth.w)), abs(vRest.y - uCloth.x));
   return mix(c, uTints[1], skin) * mix(0.82, 1.0, smoothstep(0.0, 0.007, hem));
 }
@@ -130,9 +130,11 @@ float lines(float period, float width) {
 void main() {
   float fade = 1.0 - smoothstep(2.5, 9.0, length(vWorld.xz - uCentre.xz));
   float near = 1.0 - smoothstep(1.0, 4.5, length(vWorld.xz - uCentre.xz));
-  float open = 1.0;
+  float open = 1.0, lit = 1.0;
+  // Shadows reach no further than this.
+  int caps = length(vWorld.xz - uCentre.xz) < 3.4 ? uCaps : 0;
   for (int i = 0; i < ${CAPSULES}; i++) {
-    if (i >= uCaps) break;
+    if (i >= caps) break;
     vec3 a = uCapA[i].xyz, b = uCapB[i].xyz, ab = b - a;
     float t = clamp(dot(vWorld - a, ab) / max(1e-6, dot(ab, ab)), 0.0, 1.0);
     vec3 d = a + ab * t - vWorld;
@@ -140,7 +142,7 @@ void main() {
     // Occlusion of a sphere seen from the floor: cosine over distance squared (form factor).
     open *= 1.0 - uCapB[i].w * clamp(0.85 * (max(d.y, 0.0) / l) * r * r / (l * l), 0.0, 0.8);
   }
-  float lit = keyLight(vWorld, 0.0);
+  if (caps > 0) lit = keyLight(vWorld, 0.0);
   float shadow = clamp(1.0 - open * mix(0.62, 1.0, lit), 0.0, 1.0);
   float grid = max(lines(1.0, 0.0055), 0.35 * lines(0.25, 0.0025) * near);
   vec4 ground = vec4(uFloor, 1.0) * (0.9 * fade);

@@ -1,7 +1,7 @@
 // A person of round cones on the rig's rest pose. A shape: {bone, a, b, ra, rb, k (blend), s (squeeze of x, y, z), tint}.
 // Sizes are those of an adult whose eyes are 1.58 m above the floor, scaled to the rig's.
 
-const TINT = { body: 0, skin: 1, hair: 2, eye: 3, shell: 4, visor: 5 };
+const TINT = { body: 0, skin: 1, hair: 2, eye: 3, shell: 4, visor: 5, lips: 6 };
 
 function createShapes(d) {
   const joint = (name) => d.index.get(name);
@@ -9,7 +9,7 @@ function createShapes(d) {
   const has = (...names) => names.every((name) => joint(name) !== undefined);
   const head = has("head") ? at("head") : [0, 1.5, 0];
   const u = Math.max(0.2, head[1] + d.eyes[1]) / 1.58;
-  const parts = { body: [], head: [], hair: [], eyes: [], leftHand: [], rightHand: [] };
+  const parts = { body: [], head: [], hair: [], eyes: [], mouth: [], leftHand: [], rightHand: [] };
 
   const put = (part, bone, a, b, ra, rb, extra = {}) => {
     if (!has(bone)) return;
@@ -50,9 +50,9 @@ function createShapes(d) {
       put("body", names[0], from(at("neck"), 0.03 * x, -0.005, -0.012), from(upper, -0.03 * x, 0.03, -0.006), 0.043, 0.044, { k: 0.06 * u });
       put("body", names[0], from(upper, -0.05 * x, -0.005, 0), from(upper, -0.01 * x, 0, 0), 0.066, 0.06, { k: 0.05 * u });
     }
-    put("body", names[1], from(upper, 0.005 * x, 0, 0), lerp(upper, lower, 0.35), 0.061, 0.051, { ball: true });
+    put("body", names[1], from(upper, 0.005 * x, 0, 0), lerp(upper, lower, 0.35), 0.061, 0.051, { ball: 0.97 });
     put("body", names[1], lerp(upper, lower, 0.3), lower, 0.051, 0.041, { shade: true });
-    put("body", names[2], lower, lerp(lower, wrist, 0.3), 0.041, 0.043, { ball: true });
+    put("body", names[2], lower, lerp(lower, wrist, 0.3), 0.041, 0.043, { ball: 0.97 });
     put("body", names[2], lerp(lower, wrist, 0.3), wrist, 0.043, 0.027, { shade: true });
   }
 
@@ -60,9 +60,9 @@ function createShapes(d) {
     const names = ["UpperLeg", "LowerLeg", "Foot", "Toes"].map((n) => side + n);
     if (!has(...names.slice(0, 3))) return;
     const [hip, knee, ankle] = names.slice(0, 3).map((n) => at(n));
-    put("body", names[0], from(hip, 0.004 * x, 0, 0), lerp(hip, knee, 0.45), 0.088, 0.077, { ball: true });
+    put("body", names[0], from(hip, 0.004 * x, 0, 0), lerp(hip, knee, 0.45), 0.088, 0.077, { ball: 0.84 });
     put("body", names[0], lerp(hip, knee, 0.4), knee, 0.078, 0.057, { shade: true });
-    put("body", names[1], knee, lerp(knee, ankle, 0.3), 0.057, 0.056, { ball: true });
+    put("body", names[1], knee, lerp(knee, ankle, 0.3), 0.057, 0.056, { ball: 0.97 });
     put("body", names[1], from(lerp(knee, ankle, 0.26), 0, 0, -0.02), from(lerp(knee, ankle, 0.4), 0, 0, -0.016), 0.045, 0.042);
     put("body", names[1], lerp(knee, ankle, 0.3), ankle, 0.056, 0.038, { shade: true });
     const toes = has(names[3]) ? at(names[3]) : from(ankle, 0, -0.06, 0.13);
@@ -100,18 +100,29 @@ function createShapes(d) {
     const p = (x, y, z) => from(c, x, y, z);
     const soft = (k, s = [1, 1, 1]) => ({ k: k * u, s, tint: TINT.skin });
     put("head", "head", p(0, 0.028, -0.012), p(0, 0.022, 0.008), h - 0.004, h - 0.008, { ...soft(0.02, [1.2, 1, 1]), shade: true });
-    put("head", "head", p(0, -0.02, 0.018), p(0, -0.086, 0.05), 0.066, 0.031, soft(0.03, [1.02, 1, 1]));
-    put("head", "head", p(0.033, -0.024, 0.045), p(-0.033, -0.024, 0.045), 0.03, 0.03, soft(0.03));
-    put("head", "head", p(0.03, 0.02, h - 0.024), p(-0.03, 0.02, h - 0.024), 0.013, 0.013, soft(0.014));
-    put("head", "head", p(0, 0.006, h - 0.006), p(0, -0.033, h + 0.008), 0.0065, 0.0115, soft(0.012));
-    put("head", "head", p(0.009, -0.036, h + 0.001), p(-0.009, -0.036, h + 0.001), 0.008, 0.008, soft(0.008));
-    put("head", "head", p(0.014, -0.066, h - 0.012), p(-0.014, -0.066, h - 0.012), 0.007, 0.007, soft(0.01));
-    put("head", "head", p(0.014, -0.077, h - 0.015), p(-0.014, -0.077, h - 0.015), 0.007, 0.007, soft(0.01));
+    put("head", "head", p(0, -0.02, 0.012), p(0, -0.076, 0.042), 0.07, 0.044, soft(0.03, [1.04, 1, 1]));
+    put("head", "head", p(0.03, -0.052, 0.016), p(-0.03, -0.052, 0.016), 0.038, 0.038, soft(0.03));
+    put("head", "head", p(0.008, -0.098, 0.066), p(-0.008, -0.098, 0.066), 0.02, 0.02, soft(0.03));
+    put("head", "head", p(0.034, -0.026, 0.05), p(-0.034, -0.026, 0.05), 0.028, 0.028, soft(0.03));
+    put("head", "head", p(0.03, 0.022, h - 0.022), p(-0.03, 0.022, h - 0.022), 0.013, 0.013, soft(0.014));
+    put("head", "head", p(0, 0.006, h - 0.006), p(0, -0.031, h + 0.009), 0.0065, 0.0108, soft(0.012));
+    put("head", "head", p(0.009, -0.035, h + 0.001), p(-0.009, -0.035, h + 0.001), 0.0075, 0.0075, soft(0.008));
+    // Features lie on the face, wherever the rig's sizes put it: walk in from the front.
+    const face = (x, y, out) => {
+      const q = p(x, y, 0.25);
+      const inside = (z) => parts.head.reduce((d, shape) => smoothMin(d, distanceTo(shape, q[0], q[1], z), shape.k), 1) < 0;
+      while (!inside(q[2]) && q[2] > c[2]) q[2] -= 0.0015 * u;
+      return from(q, 0, 0, out);
+    };
+    const feature = (part, tint, r, ...points) => points.slice(1).forEach((q, i) =>
+      put(part, "head", face(...points[i]), face(...q), r, r, { tint, k: 0.002 * u }));
     for (const x of [1, -1]) {
-      put("head", "head", p(0.079 * x, 0.004, -0.008), p(0.077 * x, -0.03, -0.002), 0.017, 0.011, soft(0.008, [1.7, 1, 1]));
-      put("eyes", "head", p(0.032 * x, 0, h - 0.0125), p(0.032 * x, 0, h - 0.0125), 0.0125, 0.0125, { tint: TINT.eye, k: 0.001, s: [0.95, 1.05, 1] });
-      put("hair", "head", p(0.034 * x, 0.024, h - 0.0062), p(0.017 * x, 0.022, h - 0.001), 0.0035, 0.004, { tint: TINT.hair, k: 0.001 });
+      put("head", "head", p(0.082 * x, 0.004, -0.008), p(0.079 * x, -0.03, -0.002), 0.017, 0.011, soft(0.008, [1.7, 1, 1]));
+      const eye = face(0.032 * x, 0, -0.0055);
+      put("eyes", "head", from(eye, 0, 0.0015, 0), from(eye, 0, -0.0015, 0), 0.0112, 0.0112, { tint: TINT.eye, k: 0.001 });
+      feature("mouth", TINT.hair, 0.0034, [0.046 * x, 0.02, 0], [0.034 * x, 0.0255, 0], [0.019 * x, 0.0225, 0]);
     }
+    feature("mouth", TINT.lips, 0.0036, [-0.021, -0.0655, -0.001], [-0.01, -0.069, 0], [0.01, -0.069, 0], [0.021, -0.0655, -0.001]);
     // A cap of hair: a larger skull, cut away below the hairline and in front of the ears.
     const cut = { tint: TINT.hair, k: 0.012 * u, s: [1.18, 1, 1] };
     const plane = (n, q) => { const v = unit(n); return [...v, dot(v, q)]; };
@@ -134,7 +145,7 @@ function createShapes(d) {
 function headsetShapes() {
   const shape = (a, b, r, tint, s = [1, 1, 1]) => ({ bone: 0, a, b, ra: r, rb: r, k: 0.012, s, tint });
   return {
-    head: [shape([0, 0.03, -0.01], [0, 0.02, 0.005], 0.09, TINT.shell, [1.18, 1, 1]), { ...shape([0, -0.03, 0.015], [0, -0.09, 0.04], 0.06, TINT.shell), rb: 0.03, k: 0.03 }],
+    head: [shape([0, 0.03, -0.01], [0, 0.02, 0.005], 0.09, TINT.shell, [1.18, 1, 1]), { ...shape([0, -0.035, 0.018], [0, -0.07, 0.032], 0.064, TINT.shell), rb: 0.042, k: 0.05 }],
     visor: [shape([0.052, 0.006, 0.098], [-0.052, 0.006, 0.098], 0.042, TINT.visor, [1, 1, 1.35])],
     strap: [shape([0, 0.014, -0.006], [0, 0.01, 0.01], 0.096, TINT.visor, [1.17, 4.4, 1])],
   };
