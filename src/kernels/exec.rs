@@ -101,7 +101,7 @@ impl Exec {
         let pool = Pool::new(threads)
             .map_err(|e| Error::new(ErrorKind::Io, format!("cannot start a second thread ({e}): use 1 thread")))?;
         let width = limits.width.max(1).next_multiple_of(GROUP);
-        let n = MAX_ROWS * width;
+        let n = MAX_ROWS * (width + LINE);
         Ok(Exec {
             kernels,
             pool,
@@ -173,32 +173,33 @@ impl Exec {
 
         match &w.body {
             Body::F32(buffer, geo, variant) => {
-                let x = pad_rows(x, rows, w.cols, geo.padded(), padded);
+                let (x, stride) = spread(x, rows, w.cols, geo.padded(), padded);
                 let weights = buffer.of::<f32>();
                 pool.run(tiles, &|t| {
                     let (first, panels) = span(t);
                     let mut tile: Tile<f32> = [[0.0; TILE_COLS]; MAX_ROWS];
-                    let job = matmul_f32_f32::Job { x, rows, weights, geo: *geo, first, panels };
+                    let job = matmul_f32_f32::Job { x, stride, rows, weights, geo: *geo, first, panels };
                     // SAFETY: a matrix holds a variant that this CPU can run.
                     unsafe { (variant.run)(&job, &mut tile) };
                     (0..rows).for_each(|r| finish(t, r, Sums::F32(&tile[r])));
                 });
             }
             Body::F16(buffer, geo, variant) => {
-                let x = pad_rows(x, rows, w.cols, geo.padded(), padded);
+                let (x, stride) = spread(x, rows, w.cols, geo.padded(), padded);
                 let weights = buffer.of::<half::f16>();
                 pool.run(tiles, &|t| {
                     let (first, panels) = span(t);
                     let mut tile: Tile<f32> = [[0.0; TILE_COLS]; MAX_ROWS];
-                    let job = matmul_f32_f32::Job { x, rows, weights, geo: *geo, first, panels };
+                    let job = matmul_f32_f32::Job { x, stride, rows, weights, geo: *geo, first, panels };
                     // SAFETY: a matrix holds a variant that this CPU can run.
                     unsafe { (variant.run)(&job, &mut tile) };
                     (0..rows).for_each(|r| finish(t, r, Sums::F32(&tile[r])));
                 });
             }
             Body::I8(buffer, geo, scale, variant) => {
-                let n = rows * geo.padded;
-                let (q, sums) = (&mut q.of_mut::<i8>()[..n], &mut sums[..n / GROUP]);
+                let stride = geo.padded + LINE;
+                let n = rows * stride;
+                let (q, sums) = (&mut q.of_mut::<i8>()[..n], &mut sums[..rows * geo.padded / GROUP]);
                 let x_scale = quantize(kernels, x, w.cols, geo.padded, q, sums);
                 let wide = &mut wide.of_mut::<i16>()[..if variant.run.wide { n } else { 0 }];
                 for (wide, q) in wide.iter_mut().zip(&*q) {
@@ -208,22 +209,22 @@ impl Exec {
                 pool.run(tiles, &|t| {
                     let (first, panels) = span(t);
                     let mut tile: Tile<i32> = [[0; TILE_COLS]; MAX_ROWS];
-                    let job = matmul_i8dx_i8cx::Job { q, wide, sums, rows, weights, geo: *geo, first, panels };
+                    let job = matmul_i8dx_i8cx::Job { q, wide, sums, stride, rows, weights, geo: *geo, first, panels };
                     // SAFETY: a matrix holds a variant that this CPU can run.
                     unsafe { (variant.run.run)(&job, &mut tile) };
                     (0..rows).for_each(|r| finish(t, r, Sums::I32(&tile[r], x_scale[r], &scale[t * TILE_COLS..])));
                 });
             }
             Body::I4(buffer, geo, variant) => {
-                let n = rows * geo.padded();
-                let (q, sums) = (&mut q.of_mut::<i8>()[..n], &mut sums[..n / GROUP]);
+                let stride = geo.padded() + LINE;
+                let (q, sums) = (&mut q.of_mut::<i8>()[..rows * stride], &mut sums[..rows * geo.groups]);
                 let x_scale = quantize(kernels, x, w.cols, geo.padded(), q, sums);
                 let (q, sums) = (&*q, &*sums);
                 let (weights, scales) = (buffer.of::<u8>(), buffer.of::<half::f16>());
                 pool.run(tiles, &|t| {
                     let (first, panels) = span(t);
                     let mut tile: Tile<f32> = [[0.0; TILE_COLS]; MAX_ROWS];
-                    let job = matmul_i8dx_i4g::Job { q, sums, rows, weights, scales, geo: *geo, first, panels };
+                    let job = matmul_i8dx_i4g::Job { q, sums, stride, rows, weights, scales, geo: *geo, first, panels };
                     // SAFETY: a matrix holds a variant that this CPU can run.
                     unsafe { (variant.run)(&job, &mut tile) };
                     (0..rows).for_each(|r| finish(t, r, Sums::Scaled(&tile[r], x_scale[r])));
@@ -359,20 +360,24 @@ fn ring<'a, T>(cache: &KvCache, k: &'a [T], v: &'a [T], span: Span, offset: usiz
     }
 }
 
-/// `x` itself when its rows have the padded length, else a copy with zeros behind each row.
-fn pad_rows<'a>(x: &'a [f32], rows: usize, cols: usize, padded: usize, scratch: &'a mut Buffer) -> &'a [f32] {
-    if cols == padded {
-        return x;
+/// Values between two rows of scratch: rows a multiple of 4 KiB apart would compete for one set of the first-level cache.
+const LINE: usize = 64;
+
+/// `x` itself when its few rows have the padded length, else a copy with zeros behind each row; and the distance of its rows.
+fn spread<'a>(x: &'a [f32], rows: usize, cols: usize, padded: usize, scratch: &'a mut Buffer) -> (&'a [f32], usize) {
+    if cols == padded && rows <= 4 {
+        return (x, cols);
     }
-    let scratch = &mut scratch.of_mut::<f32>()[..rows * padded];
-    for (from, to) in x.chunks_exact(cols).zip(scratch.chunks_exact_mut(padded)) {
+    let stride = padded + LINE / 4;
+    let scratch = &mut scratch.of_mut::<f32>()[..rows * stride];
+    for (from, to) in x.chunks_exact(cols).zip(scratch.chunks_exact_mut(stride)) {
         to[..cols].copy_from_slice(from);
         to[cols..].fill(0.0);
     }
-    scratch
+    (scratch, stride)
 }
 
-/// Quantises each row of `x`; returns the rows' scales.
+/// Quantises each row of `x` into rows of `q` that are `padded` and a line apart; returns the rows' scales.
 fn quantize(
     kernels: &Kernels,
     x: &[f32],
@@ -382,10 +387,10 @@ fn quantize(
     sums: &mut [i32],
 ) -> [f32; MAX_ROWS] {
     let mut scales = [0.0; MAX_ROWS];
-    let rows = x.chunks_exact(cols).zip(q.chunks_exact_mut(padded)).zip(sums.chunks_exact_mut(padded / GROUP));
+    let rows = x.chunks_exact(cols).zip(q.chunks_exact_mut(padded + LINE)).zip(sums.chunks_exact_mut(padded / GROUP));
     for (scale, ((x, q), sums)) in scales.iter_mut().zip(rows) {
         // SAFETY: a `Kernels` exists only for a level that this CPU has.
-        *scale = unsafe { (kernels.quantize.run)(x, q, sums) };
+        *scale = unsafe { (kernels.quantize.run)(x, &mut q[..padded], sums) };
     }
     scales
 }

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use memmap2::MmapMut;
+
 /// Output features of one panel: the lanes of one AVX-512 register of f32.
 pub(crate) const NR: usize = 16;
 /// Panels of one kernel call, at most.
@@ -14,42 +16,77 @@ pub(crate) const MAX_ROWS: usize = 16;
 /// Rows x columns of results of one kernel call, before bias and epilogue.
 pub(crate) type Tile<T> = [[T; TILE_COLS]; MAX_ROWS];
 
-/// One cache line; the unit of packed memory, so that it is 64-byte aligned.
+/// One cache line.
 #[repr(C, align(64))]
 #[derive(Clone, Copy)]
 struct Line([u8; 64]);
 
+/// Page size that large buffers ask the system for: fewer address translations while weights stream by.
+const HUGE: usize = 2 << 20;
+
 /// Zeroed, 64-byte aligned memory, viewed as bytes, integers or floats.
 pub(crate) struct Buffer {
-    lines: Vec<Line>,
+    store: Store,
+    bytes: usize,
+}
+
+enum Store {
+    Lines(Vec<Line>),
+    /// A mapping, and where in it the buffer begins: at a multiple of [`HUGE`].
+    Pages(MmapMut, usize),
 }
 
 impl Buffer {
     /// At least `bytes` zero bytes.
     pub(crate) fn new(bytes: usize) -> Self {
-        Self { lines: vec![Line([0; 64]); bytes.div_ceil(64)] }
+        let bytes = bytes.next_multiple_of(64);
+        let store = Self::pages(bytes).unwrap_or_else(|| Store::Lines(vec![Line([0; 64]); bytes / 64]));
+        Self { store, bytes }
+    }
+
+    /// Large buffers in huge pages, as far as they fill them; the system may decline, which costs speed alone.
+    fn pages(bytes: usize) -> Option<Store> {
+        if bytes < HUGE {
+            return None;
+        }
+        let map = MmapMut::map_anon(bytes + HUGE).ok()?;
+        let from = map.as_ptr().align_offset(HUGE);
+        #[cfg(any(target_os = "linux", target_os = "android"))]
+        let _ = map.advise_range(memmap2::Advice::HugePage, from, bytes / HUGE * HUGE);
+        (from <= HUGE).then_some(Store::Pages(map, from))
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        self.lines.len() * 64
+        self.bytes
+    }
+
+    fn start(&self) -> *const u8 {
+        match &self.store {
+            Store::Lines(lines) => lines.as_ptr().cast(),
+            Store::Pages(map, from) => map[*from..].as_ptr(),
+        }
     }
 
     /// The memory as values of `T`.
     pub(crate) fn of<T: Plain>(&self) -> &[T] {
-        // SAFETY: `lines` is `bytes()` initialised bytes aligned to 64, a multiple of `T`'s alignment, and every bit pattern is a `T`.
-        unsafe { std::slice::from_raw_parts(self.lines.as_ptr().cast(), self.bytes() / size_of::<T>()) }
+        // SAFETY: `start` is `bytes` initialised bytes aligned to 64, a multiple of `T`'s alignment, and every bit pattern is a `T`.
+        unsafe { std::slice::from_raw_parts(self.start().cast(), self.bytes / size_of::<T>()) }
     }
 
     /// The memory as values of `T`, to write.
     pub(crate) fn of_mut<T: Plain>(&mut self) -> &mut [T] {
+        let start: *mut u8 = match &mut self.store {
+            Store::Lines(lines) => lines.as_mut_ptr().cast(),
+            Store::Pages(map, from) => map[*from..].as_mut_ptr(),
+        };
         // SAFETY: as in `of`, and `&mut self` makes it the only view.
-        unsafe { std::slice::from_raw_parts_mut(self.lines.as_mut_ptr().cast(), self.bytes() / size_of::<T>()) }
+        unsafe { std::slice::from_raw_parts_mut(start.cast(), self.bytes / size_of::<T>()) }
     }
 }
 
 impl fmt::Debug for Buffer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Buffer({} bytes)", self.bytes())
+        write!(f, "Buffer({} bytes)", self.bytes)
     }
 }
 
@@ -118,3 +155,33 @@ macro_rules! for_rows {
     };
 }
 pub(crate) use for_rows;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn buffers_are_zeroed_and_aligned() {
+        for bytes in [0, 1, 64, 1000, HUGE - 64, HUGE, 3 * HUGE + 100] {
+            let mut buffer = Buffer::new(bytes);
+            assert!(buffer.bytes() >= bytes && buffer.bytes() < bytes + 64, "{buffer:?}");
+            assert!(buffer.of::<u8>().iter().all(|&b| b == 0));
+            assert!((buffer.of::<f32>().as_ptr() as usize).is_multiple_of(64));
+            if let Some(last) = buffer.of_mut::<i16>().last_mut() {
+                *last = -1;
+                assert_eq!(buffer.of::<u8>()[buffer.bytes() - 1], 255);
+            }
+        }
+    }
+
+    #[test]
+    fn every_float_weight_has_a_place_of_its_own() {
+        for cols in [1, 3, 4, 17, 64] {
+            let geo = FloatGeometry::new(cols, 2);
+            let mut seen = vec![false; 3 * geo.panel];
+            for (r, c) in (0..3 * NR).flat_map(|r| (0..cols).map(move |c| (r, c))) {
+                assert!(!std::mem::replace(&mut seen[geo.at(r, c)], true));
+            }
+        }
+    }
+}

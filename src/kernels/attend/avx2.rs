@@ -66,14 +66,14 @@ fn body<T>(head: &Head<'_, T>, q: &[f32], out: &mut [f32], load: impl Fn(*const 
         if start > 0 {
             out.iter_mut().for_each(|o| *o *= keep);
         }
-        let mut column = 0;
-        while column + 16 * BLOCK <= out.len() {
-            mix::<BLOCK, T>(head, start, &p[..tokens], column, out, load);
-            column += 16 * BLOCK;
-        }
+        let (p, mut column) = (&p[..tokens], 0);
         while column < out.len() {
-            mix::<1, T>(head, start, &p[..tokens], column, out, load);
-            column += 16;
+            // Few registers would wait for each other's sums.
+            column += match (out.len() - column) / 16 {
+                BLOCK.. => mix::<BLOCK, T>(head, start, p, column, out, load),
+                2.. => mix::<2, T>(head, start, p, column, out, load),
+                _ => mix::<1, T>(head, start, p, column, out, load),
+            };
         }
     }
     if head.len > 0 {
@@ -117,7 +117,7 @@ fn fold(v: Pair) -> f32 {
     _mm_cvtss_f32(_mm_add_ss(v, _mm_movehdup_ps(v)))
 }
 
-/// Adds the weighted values of a chunk to 16 N columns of `out`.
+/// Adds the weighted values of a chunk to 16 N columns of `out`; returns their number.
 #[target_feature(enable = "avx2,fma,f16c")]
 fn mix<const N: usize, T>(
     head: &Head<'_, T>,
@@ -126,7 +126,7 @@ fn mix<const N: usize, T>(
     column: usize,
     out: &mut [f32],
     load: impl Fn(*const T) -> Pair + Copy,
-) {
+) -> usize {
     let out = out[column..][..16 * N].as_mut_ptr();
     // SAFETY: 16 N values at `out`.
     let mut acc: [Pair; N] = std::array::from_fn(|i| unsafe { load16(out.add(16 * i)) });
@@ -148,4 +148,5 @@ fn mix<const N: usize, T>(
             _mm256_storeu_ps(out.add(16 * i + 8), acc[1]);
         }
     }
+    16 * N
 }

@@ -52,14 +52,15 @@ fn body<T>(head: &Head<'_, T>, q: &[f32], out: &mut [f32], load: impl Fn(*const 
         if start > 0 {
             out.iter_mut().for_each(|o| *o *= keep);
         }
-        let mut column = 0;
-        while column + 16 * BLOCK <= out.len() {
-            mix::<BLOCK, T>(head, start, &p[..tokens], column, out, load);
-            column += 16 * BLOCK;
-        }
+        let (p, mut column) = (&p[..tokens], 0);
         while column < out.len() {
-            mix::<1, T>(head, start, &p[..tokens], column, out, load);
-            column += 16;
+            // Few registers would wait for each other's sums.
+            column += match (out.len() - column) / 16 {
+                BLOCK.. => mix::<BLOCK, T>(head, start, p, column, out, load),
+                4.. => mix::<4, T>(head, start, p, column, out, load),
+                2.. => mix::<2, T>(head, start, p, column, out, load),
+                _ => mix::<1, T>(head, start, p, column, out, load),
+            };
         }
     }
     if head.len > 0 {
@@ -100,7 +101,7 @@ fn fold(v: __m512) -> f32 {
     _mm_cvtss_f32(_mm_add_ss(v, _mm_movehdup_ps(v)))
 }
 
-/// Adds the weighted values of a chunk to 16 N columns of `out`.
+/// Adds the weighted values of a chunk to 16 N columns of `out`; returns their number.
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,f16c")]
 fn mix<const N: usize, T>(
     head: &Head<'_, T>,
@@ -109,7 +110,7 @@ fn mix<const N: usize, T>(
     column: usize,
     out: &mut [f32],
     load: impl Fn(*const T) -> __m512 + Copy,
-) {
+) -> usize {
     let out = out[column..][..16 * N].as_mut_ptr();
     // SAFETY: 16 N values at `out`.
     let mut acc: [__m512; N] = std::array::from_fn(|i| unsafe { _mm512_loadu_ps(out.add(16 * i)) });
@@ -125,4 +126,5 @@ fn mix<const N: usize, T>(
         // SAFETY: as above.
         unsafe { _mm512_storeu_ps(out.add(16 * i), *acc) };
     }
+    16 * N
 }

@@ -68,14 +68,14 @@ fn body<T>(head: &Head<'_, T>, q: &[f32], out: &mut [f32], load: impl Fn(*const 
         if start > 0 {
             out.iter_mut().for_each(|o| *o *= keep);
         }
-        let mut column = 0;
-        while column + 16 * BLOCK <= out.len() {
-            mix::<BLOCK, T>(head, start, &p[..tokens], column, out, load);
-            column += 16 * BLOCK;
-        }
+        let (p, mut column) = (&p[..tokens], 0);
         while column < out.len() {
-            mix::<1, T>(head, start, &p[..tokens], column, out, load);
-            column += 16;
+            // Few registers would wait for each other's sums.
+            column += match (out.len() - column) / 16 {
+                BLOCK.. => mix::<BLOCK, T>(head, start, p, column, out, load),
+                2.. => mix::<2, T>(head, start, p, column, out, load),
+                _ => mix::<1, T>(head, start, p, column, out, load),
+            };
         }
     }
     if head.len > 0 {
@@ -118,7 +118,7 @@ fn fold(v: Quad) -> f32 {
     vget_lane_f32::<0>(v) + vget_lane_f32::<1>(v)
 }
 
-/// Adds the weighted values of a chunk to 16 N columns of `out`.
+/// Adds the weighted values of a chunk to 16 N columns of `out`; returns their number.
 #[target_feature(enable = "neon")]
 fn mix<const N: usize, T>(
     head: &Head<'_, T>,
@@ -127,7 +127,7 @@ fn mix<const N: usize, T>(
     column: usize,
     out: &mut [f32],
     load: impl Fn(*const T) -> Quad + Copy,
-) {
+) -> usize {
     let out = out[column..][..16 * N].as_mut_ptr();
     // SAFETY: 16 N values at `out`.
     let mut acc: [Quad; N] = std::array::from_fn(|i| unsafe { load16(out.add(16 * i)) });
@@ -146,4 +146,5 @@ fn mix<const N: usize, T>(
         // SAFETY: as above.
         unsafe { (0..4).for_each(|h| vst1q_f32(out.add(16 * i + 4 * h), acc[h])) };
     }
+    16 * N
 }

@@ -19,8 +19,9 @@ fn variants_have_the_bits_of_the_reference() {
             }
             let (first, panels) = (random.below(3), 1 + random.below(4));
             let panels = panels.min(6 - first);
-            let x = random.floats(rows * geo.padded() + 1, 2.0);
-            let job = Job { x: &x[1..], rows, weights, geo, first, panels };
+            let stride = geo.padded() + random.below(2) * 16;
+            let x = random.floats(rows * stride + 1, 2.0);
+            let job = Job { x: &x[1..], stride, rows, weights, geo, first, panels };
             let run = |v: &crate::kernels::Variant<super::Run>| {
                 let mut tile: Tile<f32> = [[7.0; TILE_COLS]; 16];
                 // SAFETY: `available` yields only what this CPU can run.
@@ -52,7 +53,7 @@ fn products_of_small_integers_are_exact() {
     for v in available(VARIANTS) {
         let mut tile: Tile<f32> = [[7.0; TILE_COLS]; 16];
         // SAFETY: `available` yields only what this CPU can run.
-        unsafe { (v.run)(&Job { x: &x, rows: 3, weights, geo, first: 0, panels: 2 }, &mut tile) };
+        unsafe { (v.run)(&Job { x: &x, stride: geo.padded(), rows: 3, weights, geo, first: 0, panels: 2 }, &mut tile) };
         for r in 0..3 {
             for c in 0..2 * NR {
                 let want: f32 = (0..37).map(|k| x[r * geo.padded() + k] * weights[geo.at(c, k)].to_f32()).sum();

@@ -65,9 +65,9 @@ fn block<const R: usize, const P: usize, W, L: Fn(*const W) -> Pair + Copy>(
     load: L,
 ) {
     let FloatGeometry { seg, seg_stride, panel } = job.geo;
-    let padded = job.geo.padded();
+    let stride = job.stride;
     let weights = job.weights[(job.first + from.1) * panel..][..P * panel].as_ptr();
-    let x = job.x[from.0 * padded..][..R * padded].as_ptr();
+    let x = job.x[from.0 * stride..][..R * stride].as_ptr();
     let mut acc = [[[_mm256_setzero_ps(); 2]; P]; R];
     for k in 0..seg {
         for s in 0..SEGMENTS {
@@ -79,8 +79,8 @@ fn block<const R: usize, const P: usize, W, L: Fn(*const W) -> Pair + Copy>(
                     load(line)
                 };
                 for r in 0..R {
-                    // SAFETY: column s * seg + k of row r, below `padded`.
-                    let x = _mm256_set1_ps(unsafe { *x.add(r * padded + s * seg + k) });
+                    // SAFETY: column s * seg + k of row r, below `stride`.
+                    let x = _mm256_set1_ps(unsafe { *x.add(r * stride + s * seg + k) });
                     for h in 0..2 {
                         acc[r][c][h] = _mm256_fmadd_ps(x, w[h], acc[r][c][h]);
                     }

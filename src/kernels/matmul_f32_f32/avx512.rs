@@ -45,9 +45,9 @@ fn block<const R: usize, const P: usize, W, L: Fn(*const W) -> __m512 + Copy>(
     load: L,
 ) {
     let FloatGeometry { seg, seg_stride, panel } = job.geo;
-    let padded = job.geo.padded();
+    let stride = job.stride;
     let weights = job.weights[(job.first + p) * panel..][..P * panel].as_ptr();
-    let x = job.x[..R * padded].as_ptr();
+    let x = job.x[..R * stride].as_ptr();
     let mut acc = [[_mm512_setzero_ps(); P]; R];
     for k in 0..seg {
         for s in 0..SEGMENTS {
@@ -61,8 +61,8 @@ fn block<const R: usize, const P: usize, W, L: Fn(*const W) -> __m512 + Copy>(
                 }
             }
             for r in 0..R {
-                // SAFETY: column s * seg + k of row r, below `padded`.
-                let x = _mm512_set1_ps(unsafe { *x.add(r * padded + s * seg + k) });
+                // SAFETY: column s * seg + k of row r, below `stride`.
+                let x = _mm512_set1_ps(unsafe { *x.add(r * stride + s * seg + k) });
                 for c in 0..P {
                     acc[r][c] = _mm512_fmadd_ps(x, w[c], acc[r][c]);
                 }

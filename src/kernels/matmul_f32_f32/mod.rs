@@ -1,6 +1,6 @@
 //! f32 rows times f32 weights: tile\[r\]\[c\] = sum_k x\[r\]\[k\] w\[c\]\[k\].
 //!
-//! Contract of a variant: `rows` in 1..=16 rows of `geo.padded()` values at `x`, `panels` in 1..=4 panels from `first`;
+//! Contract of a variant: `rows` in 1..=16 rows of `geo.padded()` values, `stride` apart, at `x`, `panels` in 1..=4 panels from `first`;
 //! it fills the first `rows` rows and `16 panels` columns of the tile. Sums run over the segments side by side
 //! ([`FloatGeometry`]), one fused multiply-add a term, from zero.
 
@@ -20,6 +20,8 @@ pub(crate) use scalar::body;
 /// Operands of a float product; `W` is the weights' type.
 pub(crate) struct Job<'a, W> {
     pub(crate) x: &'a [f32],
+    /// From one row of x to the next.
+    pub(crate) stride: usize,
     pub(crate) rows: usize,
     pub(crate) weights: &'a [W],
     pub(crate) geo: FloatGeometry,
@@ -31,7 +33,7 @@ impl<W> Job<'_, W> {
     /// What every variant relies on.
     pub(crate) fn check(&self) {
         assert!((1..=16).contains(&self.rows) && (1..=4).contains(&self.panels), "rows 1..=16, panels 1..=4");
-        assert!(self.x.len() >= self.rows * self.geo.padded(), "rows of x are padded");
+        assert!(self.stride >= self.geo.padded() && self.x.len() >= self.rows * self.stride, "rows of x are padded");
         assert!(self.weights.len() >= (self.first + self.panels) * self.geo.panel, "panels exist");
     }
 }

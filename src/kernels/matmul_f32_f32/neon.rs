@@ -58,9 +58,9 @@ fn block<const R: usize, const P: usize, W, L: Fn(*const W) -> Quad + Copy>(
     load: L,
 ) {
     let FloatGeometry { seg, seg_stride, panel } = job.geo;
-    let padded = job.geo.padded();
+    let stride = job.stride;
     let weights = job.weights[(job.first + from.1) * panel..][..P * panel].as_ptr();
-    let x = job.x[from.0 * padded..][..R * padded].as_ptr();
+    let x = job.x[from.0 * stride..][..R * stride].as_ptr();
     let mut acc = [[[vdupq_n_f32(0.0); 4]; P]; R];
     for k in 0..seg {
         for s in 0..SEGMENTS {
@@ -68,8 +68,8 @@ fn block<const R: usize, const P: usize, W, L: Fn(*const W) -> Quad + Copy>(
                 // SAFETY: 16 weights of column k of segment s of panel c, all within the slice.
                 let w = load(unsafe { weights.add(c * panel + s * seg_stride + k * NR) });
                 for r in 0..R {
-                    // SAFETY: column s * seg + k of row r, below `padded`.
-                    let x = unsafe { *x.add(r * padded + s * seg + k) };
+                    // SAFETY: column s * seg + k of row r, below `stride`.
+                    let x = unsafe { *x.add(r * stride + s * seg + k) };
                     for i in 0..4 {
                         acc[r][c][i] = vfmaq_n_f32(acc[r][c][i], w[i], x);
                     }

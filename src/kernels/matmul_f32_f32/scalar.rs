@@ -11,7 +11,7 @@ pub(super) fn run(job: &Job<'_, f32>, tile: &mut Tile<f32>) {
 pub(crate) fn body<W: Copy>(job: &Job<'_, W>, tile: &mut Tile<f32>, to_f32: impl Fn(W) -> f32) {
     let FloatGeometry { seg, seg_stride, panel } = job.geo;
     for r in 0..job.rows {
-        let x = &job.x[r * job.geo.padded()..][..job.geo.padded()];
+        let x = &job.x[r * job.stride..][..job.geo.padded()];
         for p in 0..job.panels {
             let w = &job.weights[(job.first + p) * panel..][..panel];
             let mut acc = [0.0f32; NR];

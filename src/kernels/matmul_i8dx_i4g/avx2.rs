@@ -49,11 +49,11 @@ fn block<const R: usize>(
     dot: impl Fn(__m256i, __m256i, __m256i) -> __m256i + Copy,
     widen: impl Fn(__m256i) -> __m256i + Copy,
 ) {
-    let (groups, panel, padded) = (job.geo.groups, job.geo.panel, job.geo.padded());
+    let (groups, panel, stride) = (job.geo.groups, job.geo.panel, job.stride);
     let start = (job.first + from.1) * panel;
     let weights = job.weights[start..][..panel].as_ptr();
     let scales = job.scales[(start + groups * GROUP_BYTES) / 2..][..groups * NR].as_ptr();
-    let q = job.q[from.0 * padded..][..R * padded].as_ptr();
+    let q = job.q[from.0 * stride..][..R * stride].as_ptr();
     let sums = &job.sums[from.0 * groups..][..R * groups];
     let low = _mm256_set1_epi8(15);
     let mut total = [[_mm256_setzero_ps(); 2]; R];
@@ -69,9 +69,9 @@ fn block<const R: usize>(
                 };
                 let (a, b) = (_mm256_and_si256(w, low), _mm256_and_si256(_mm256_srli_epi16::<4>(w), low));
                 for (r, acc) in acc.iter_mut().enumerate() {
-                    // SAFETY: 8 bytes at column 32 g + 8 j of row r, within R rows of `padded` bytes.
+                    // SAFETY: 8 bytes at column 32 g + 8 j of row r, within R rows, `stride` apart.
                     let (x, y) = unsafe {
-                        let x = q.add(r * padded + g * GROUP + j * 8).cast::<i32>();
+                        let x = q.add(r * stride + g * GROUP + j * 8).cast::<i32>();
                         (x.read_unaligned(), x.add(1).read_unaligned())
                     };
                     *acc = dot(dot(*acc, a, _mm256_set1_epi32(x)), b, _mm256_set1_epi32(y));

@@ -48,11 +48,11 @@ fn rows<const P: usize>(job: &Job<'_>, rows: usize, from: (usize, usize), tile: 
 /// Rows from `from.0`, panels from `from.1` of the job.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
 fn block<const R: usize, const P: usize>(job: &Job<'_>, from: (usize, usize), tile: &mut Tile<f32>) {
-    let (groups, panel, padded) = (job.geo.groups, job.geo.panel, job.geo.padded());
+    let (groups, panel, stride) = (job.geo.groups, job.geo.panel, job.stride);
     let start = (job.first + from.1) * panel;
     let weights = job.weights[start..][..P * panel].as_ptr();
     let scales = job.scales[start / 2..][..P * panel / 2].as_ptr();
-    let q = job.q[from.0 * padded..][..R * padded].as_ptr();
+    let q = job.q[from.0 * stride..][..R * stride].as_ptr();
     let sums = &job.sums[from.0 * groups..][..R * groups];
     let low = _mm512_set1_epi8(15);
     let mut total = [[_mm512_setzero_ps(); P]; R];
@@ -71,9 +71,9 @@ fn block<const R: usize, const P: usize>(job: &Job<'_>, from: (usize, usize), ti
                 };
                 let (a, b) = (_mm512_and_si512(w, low), _mm512_and_si512(_mm512_srli_epi16::<4>(w), low));
                 for (r, acc) in acc.iter_mut().enumerate() {
-                    // SAFETY: 8 bytes at column 32 g + 8 j of row r, within R rows of `padded` bytes.
+                    // SAFETY: 8 bytes at column 32 g + 8 j of row r, within R rows, `stride` apart.
                     let (x, y) = unsafe {
-                        let x = q.add(r * padded + g * GROUP + j * 8).cast::<i32>();
+                        let x = q.add(r * stride + g * GROUP + j * 8).cast::<i32>();
                         (x.read_unaligned(), x.add(1).read_unaligned())
                     };
                     *acc = _mm512_dpbusd_epi32(*acc, a, _mm512_set1_epi32(x));

@@ -61,6 +61,8 @@ impl Geometry {
 pub(crate) struct Job<'a> {
     pub(crate) q: &'a [i8],
     pub(crate) sums: &'a [i32],
+    /// From one row of q to the next.
+    pub(crate) stride: usize,
     pub(crate) rows: usize,
     pub(crate) weights: &'a [u8],
     pub(crate) scales: &'a [f16],
@@ -72,9 +74,9 @@ pub(crate) struct Job<'a> {
 impl Job<'_> {
     /// What every variant relies on.
     pub(crate) fn check(&self) {
-        let n = self.rows * self.geo.groups;
         assert!((1..=16).contains(&self.rows) && (1..=4).contains(&self.panels), "rows 1..=16, panels 1..=4");
-        assert!(self.q.len() >= n * GROUP && self.sums.len() >= n, "rows are padded");
+        assert!(self.stride >= self.geo.padded() && self.q.len() >= self.rows * self.stride, "rows are padded");
+        assert!(self.sums.len() >= self.rows * self.geo.groups, "sums of every group");
         let bytes = (self.first + self.panels) * self.geo.panel;
         assert!(self.weights.len() >= bytes && self.scales.len() >= bytes / 2, "panels exist");
     }

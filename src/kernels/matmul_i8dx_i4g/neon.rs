@@ -53,11 +53,11 @@ fn block<const R: usize>(
     tile: &mut Tile<f32>,
     dot: impl Fn(&[uint8x16_t; 16], *const i8, usize) -> int32x4_t + Copy,
 ) {
-    let (groups, panel, padded) = (job.geo.groups, job.geo.panel, job.geo.padded());
+    let (groups, panel, stride) = (job.geo.groups, job.geo.panel, job.stride);
     let start = (job.first + from.1) * panel;
     let weights = job.weights[start..][..panel].as_ptr();
     let scales = job.scales[(start + groups * GROUP_BYTES) / 2..][..groups * NR].as_ptr().cast::<u16>();
-    let q = job.q[from.0 * padded..][..R * padded].as_ptr();
+    let q = job.q[from.0 * stride..][..R * stride].as_ptr();
     let sums = &job.sums[from.0 * groups..][..R * groups];
     let mut total = [[vdupq_n_f32(0.0); 4]; R];
     for g in 0..groups {
@@ -68,8 +68,8 @@ fn block<const R: usize>(
             let scale = unsafe { vld1_u16(scales.add(g * NR + i * 4)) };
             let scale = vcvt_f32_f16(vreinterpret_f16_u16(scale));
             for r in 0..R {
-                // SAFETY: group g of row r, within R rows of `padded` bytes.
-                let x = unsafe { q.add(r * padded + g * GROUP) };
+                // SAFETY: group g of row r, within R rows, `stride` apart.
+                let x = unsafe { q.add(r * stride + g * GROUP) };
                 let sum = vaddq_s32(dot(&w, x, i), vdupq_n_s32(-8 * sums[r * groups + g]));
                 total[r][i] = vfmaq_f32(total[r][i], scale, vcvtq_f32_s32(sum));
             }

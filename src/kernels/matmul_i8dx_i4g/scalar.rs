@@ -4,7 +4,7 @@ pub(super) fn run(job: &Job<'_>, tile: &mut Tile<f32>) {
     job.check();
     let padded = job.geo.padded();
     for r in 0..job.rows {
-        let q = &job.q[r * padded..][..padded];
+        let q = &job.q[r * job.stride..][..padded];
         for p in 0..job.panels {
             let start = (job.first + p) * job.geo.panel;
             let nibbles = job.weights[start..][..job.geo.groups * GROUP_BYTES].as_chunks::<GROUP_BYTES>().0;

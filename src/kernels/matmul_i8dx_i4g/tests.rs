@@ -14,12 +14,16 @@ fn compare(
 ) {
     let geo = Geometry::new(cols);
     let padded = geo.padded();
-    let mut q = vec![0i8; rows * padded + 1];
+    let stride = padded + 64 * random.below(2);
+    let mut q = vec![0i8; rows * stride + 1];
     for r in 0..rows {
-        (0..cols).for_each(|c| q[1 + r * padded + c] = x(random));
+        (0..cols).for_each(|c| q[1 + r * stride + c] = x(random));
     }
     let q = &q[1..];
-    let sums: Vec<i32> = q.chunks_exact(GROUP).map(|g| g.iter().map(|&v| i32::from(v)).sum()).collect();
+    let sums: Vec<i32> = (0..rows)
+        .flat_map(|r| q[r * stride..][..padded].chunks_exact(GROUP))
+        .map(|g| g.iter().map(|&v| i32::from(v)).sum())
+        .collect();
     let mut buffer = Buffer::new(6 * geo.panel);
     for out in 0..6 * NR {
         for c in 0..padded {
@@ -33,7 +37,7 @@ fn compare(
     let (weights, scales) = (buffer.of::<u8>(), buffer.of::<f16>());
     let first = random.below(3);
     let panels = (1 + random.below(4)).min(6 - first);
-    let job = Job { q, sums: &sums, rows, weights, scales, geo, first, panels };
+    let job = Job { q, sums: &sums, stride, rows, weights, scales, geo, first, panels };
     let run = |v: &crate::kernels::Variant<super::Run>| {
         let mut tile: Tile<f32> = [[7.0; TILE_COLS]; 16];
         // SAFETY: `available` yields only what this CPU can run.
@@ -48,7 +52,7 @@ fn compare(
             for k in 0..padded {
                 let (at, high) = geo.at(out, k);
                 let w = f64::from(if high { weights[at] >> 4 } else { weights[at] & 15 }) - 8.0;
-                let term = w * f64::from(q[r * padded + k]) * scales[geo.scale_at(out, k / GROUP)].to_f64();
+                let term = w * f64::from(q[r * stride + k]) * scales[geo.scale_at(out, k / GROUP)].to_f64();
                 sum += term;
                 size += term.abs();
             }

@@ -14,7 +14,7 @@ const STREAMS: usize = 4;
 #[target_feature(enable = "avx2")]
 pub(super) fn run(job: &Job<'_>, tile: &mut Tile<i32>) {
     job.check();
-    assert!(job.wide.len() >= job.rows * job.geo.padded, "widened rows");
+    assert!(job.wide.len() >= job.rows * job.stride, "widened rows");
     for p in 0..job.panels {
         let mut r = 0;
         while r < job.rows {
@@ -35,7 +35,7 @@ pub(super) fn run(job: &Job<'_>, tile: &mut Tile<i32>) {
 fn block<const R: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<i32>) {
     let padded = job.geo.padded;
     let weights = job.weights[(job.first + p) * job.geo.panel..][..NR * padded].as_ptr();
-    let x = job.wide[row * padded..][..R * padded].as_ptr();
+    let x = job.wide[row * job.stride..][..R * job.stride].as_ptr();
     let mut acc = [[_mm256_setzero_si256(); 2]; R];
     let part = padded / 4 / STREAMS;
     for k in 0..part {
@@ -51,9 +51,9 @@ fn block<const R: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<i3
                 let even = _mm256_srai_epi16::<8>(_mm256_slli_epi16::<8>(w));
                 let odd = _mm256_srai_epi16::<8>(w);
                 for r in 0..R {
-                    // SAFETY: columns 4k .. 4k + 4 of row r, within R rows of `padded` values.
+                    // SAFETY: columns 4k .. 4k + 4 of row r, within R rows, `stride` apart.
                     let (a, b) = unsafe {
-                        let x = x.add(r * padded + 4 * k).cast::<i32>();
+                        let x = x.add(r * job.stride + 4 * k).cast::<i32>();
                         (x.read_unaligned(), x.add(1).read_unaligned())
                     };
                     let sum = _mm256_add_epi32(

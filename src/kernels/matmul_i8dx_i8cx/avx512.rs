@@ -40,7 +40,7 @@ fn rows<const R: usize>(job: &Job<'_>, tile: &mut Tile<i32>) {
 fn block<const R: usize, const P: usize>(job: &Job<'_>, p: usize, tile: &mut Tile<i32>) {
     let padded = job.geo.padded;
     let weights = job.weights[(job.first + p) * job.geo.panel..][..P * job.geo.panel].as_ptr();
-    let q = job.q[..R * padded].as_ptr();
+    let q = job.q[..R * job.stride].as_ptr();
     let groups = padded / GROUP;
     let mut acc = [[_mm512_setzero_si512(); P]; R];
     for (r, acc) in acc.iter_mut().enumerate() {
@@ -60,8 +60,8 @@ fn block<const R: usize, const P: usize>(job: &Job<'_>, p: usize, tile: &mut Til
                     _mm512_loadu_si512(line.cast())
                 };
                 for r in 0..R {
-                    // SAFETY: 4 bytes at column 4k of row r, within R rows of `padded` bytes.
-                    let x = unsafe { q.add(r * padded + 4 * k).cast::<i32>().read_unaligned() };
+                    // SAFETY: 4 bytes at column 4k of row r, within R rows, `stride` apart.
+                    let x = unsafe { q.add(r * job.stride + 4 * k).cast::<i32>().read_unaligned() };
                     acc[r][c] = _mm512_dpbusd_epi32(acc[r][c], w, _mm512_set1_epi32(x));
                 }
             }

@@ -48,7 +48,7 @@ fn rows<const R: usize>(job: &Job<'_>, tile: &mut Tile<i32>) {
 fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<i32>) {
     let padded = job.geo.padded;
     let weights = job.weights[(job.first + p) * job.geo.panel..][..P * job.geo.panel].as_ptr();
-    let q = job.q[row * padded..][..R * padded].as_ptr();
+    let q = job.q[row * job.stride..][..R * job.stride].as_ptr();
     let groups = padded / GROUP;
     let mut acc = [[[_mm256_setzero_si256(); 2]; P]; R];
     for (r, acc) in acc.iter_mut().enumerate() {
@@ -67,8 +67,8 @@ fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, ti
                     [_mm256_loadu_si256(line.cast()), _mm256_loadu_si256(line.add(32).cast())]
                 };
                 for r in 0..R {
-                    // SAFETY: 4 bytes at column 4k of row r, within R rows of `padded` bytes.
-                    let x = _mm256_set1_epi32(unsafe { q.add(r * padded + 4 * k).cast::<i32>().read_unaligned() });
+                    // SAFETY: 4 bytes at column 4k of row r, within R rows, `stride` apart.
+                    let x = _mm256_set1_epi32(unsafe { q.add(r * job.stride + 4 * k).cast::<i32>().read_unaligned() });
                     for h in 0..2 {
                         acc[r][c][h] = _mm256_dpbusd_avx_epi32(acc[r][c][h], w[h], x);
                     }

@@ -61,15 +61,15 @@ fn rows<const R: usize>(job: &Job<'_>, tile: &mut Tile<i32>) {
 fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<i32>) {
     let padded = job.geo.padded;
     let weights = job.weights[(job.first + p) * job.geo.panel..][..P * job.geo.panel].as_ptr().cast::<i8>();
-    let q = job.q[row * padded..][..R * padded].as_ptr();
+    let q = job.q[row * job.stride..][..R * job.stride].as_ptr();
     let mut acc = [[[vdupq_n_s32(0); 4]; P]; R];
     // Sixteen columns at a time: four lines of weights, one register of activations a row.
     let part = padded / 16 / STREAMS;
     for k in 0..part {
         for s in 0..STREAMS {
             let k = k + s * part;
-            // SAFETY: columns 16k .. 16k + 16 of row r, within R rows of `padded` bytes.
-            let x: [int8x16_t; R] = std::array::from_fn(|r| unsafe { vld1q_s8(q.add(r * padded + 16 * k)) });
+            // SAFETY: columns 16k .. 16k + 16 of row r, within R rows, `stride` apart.
+            let x: [int8x16_t; R] = std::array::from_fn(|r| unsafe { vld1q_s8(q.add(r * job.stride + 16 * k)) });
             for c in 0..P {
                 for i in 0..4 {
                     // SAFETY: 16 bytes of each of the lines 4k .. 4k + 4 of panel c, within the slice.

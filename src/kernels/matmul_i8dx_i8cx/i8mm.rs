@@ -43,7 +43,7 @@ fn block<const PAIRS: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Til
     let weights = job.weights[(job.first + p) * job.geo.panel..][..NR * padded].as_ptr().cast::<i8>();
     let last = job.rows - 1;
     let rows: [[*const i8; 2]; PAIRS] =
-        std::array::from_fn(|i| [0, 1].map(|j| job.q[last.min(row + 2 * i + j) * padded..][..padded].as_ptr()));
+        std::array::from_fn(|i| [0, 1].map(|j| job.q[last.min(row + 2 * i + j) * job.stride..][..padded].as_ptr()));
     let mut acc = [[vdupq_n_s32(0); 8]; PAIRS];
     let part = padded / 8 / STREAMS;
     for k in 0..part {

@@ -24,6 +24,7 @@ mod scalar;
 
 /// Order of the bytes of 16 outputs x 4 or 8 columns in packed weights, as a variant wants them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(dead_code, reason = "an architecture uses some of them")]
 pub(crate) enum Layout {
     /// Lines of 64 bytes: for each lane 4 consecutive columns.
     Quads,
@@ -68,12 +69,14 @@ impl Geometry {
     }
 }
 
-/// Operands: `rows` in 1..=16 rows of `geo.padded` values at `q` (and widened at `wide`, where the variant asks for it), the sums of
+/// Operands: `rows` in 1..=16 rows of `geo.padded` values, `stride` apart, at `q` (and widened at `wide`, where the variant asks for it), the sums of
 /// their groups of 32 at `sums`; `panels` in 1..=4 panels from `first`.
 pub(crate) struct Job<'a> {
     pub(crate) q: &'a [i8],
     pub(crate) wide: &'a [i16],
     pub(crate) sums: &'a [i32],
+    /// From one row of q to the next.
+    pub(crate) stride: usize,
     pub(crate) rows: usize,
     pub(crate) weights: &'a [u8],
     pub(crate) geo: Geometry,
@@ -84,9 +87,10 @@ pub(crate) struct Job<'a> {
 impl Job<'_> {
     /// What every variant relies on.
     pub(crate) fn check(&self) {
-        let n = self.rows * self.geo.padded;
+        let groups = self.geo.padded / GROUP;
         assert!((1..=16).contains(&self.rows) && (1..=4).contains(&self.panels), "rows 1..=16, panels 1..=4");
-        assert!(self.q.len() >= n && self.sums.len() >= n / GROUP, "rows are padded");
+        assert!(self.stride >= self.geo.padded && self.q.len() >= self.rows * self.stride, "rows are padded");
+        assert!(self.sums.len() >= self.rows * groups, "sums of every group");
         assert!(self.weights.len() >= (self.first + self.panels) * self.geo.panel, "panels exist");
     }
 }

@@ -28,7 +28,7 @@ pub(super) fn run(job: &Job<'_>, tile: &mut Tile<i32>) {
 fn block<const R: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<i32>) {
     let padded = job.geo.padded;
     let weights = job.weights[(job.first + p) * job.geo.panel..][..NR * padded].as_ptr().cast::<i8>();
-    let q = job.q[row * padded..][..R * padded].as_ptr();
+    let q = job.q[row * job.stride..][..R * job.stride].as_ptr();
     let mut acc = [[vdupq_n_s32(0); 4]; R];
     let part = padded / 4 / STREAMS;
     for k in 0..part {
@@ -37,8 +37,8 @@ fn block<const R: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<i3
             // SAFETY: line k < padded / 4 of the panel.
             let w: [int8x16_t; 4] = std::array::from_fn(|i| unsafe { vld1q_s8(weights.add(k * 64 + i * 16)) });
             for r in 0..R {
-                // SAFETY: 4 bytes at column 4k of row r, within R rows of `padded` bytes.
-                let x = unsafe { q.add(r * padded + 4 * k).cast::<i32>().read_unaligned() };
+                // SAFETY: 4 bytes at column 4k of row r, within R rows, `stride` apart.
+                let x = unsafe { q.add(r * job.stride + 4 * k).cast::<i32>().read_unaligned() };
                 let x = vreinterpretq_s8_s32(vdupq_n_s32(x));
                 for i in 0..4 {
                     let low = vmull_s8(vget_low_s8(w[i]), vget_low_s8(x));

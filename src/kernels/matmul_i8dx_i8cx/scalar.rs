@@ -4,7 +4,7 @@ pub(super) fn run(job: &Job<'_>, tile: &mut Tile<i32>) {
     job.check();
     let padded = job.geo.padded;
     for r in 0..job.rows {
-        let q = &job.q[r * padded..][..padded];
+        let q = &job.q[r * job.stride..][..padded];
         for p in 0..job.panels {
             let w = &job.weights[(job.first + p) * job.geo.panel..][..NR * padded];
             let mut acc = [0i32; NR];

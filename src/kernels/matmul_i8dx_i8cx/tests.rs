@@ -4,20 +4,24 @@ use crate::kernels::quantize_rows::GROUP;
 use crate::kernels::testing::{Random, available};
 
 /// Sums of `rows` rows of q (padded) with weights `w` (6 panels of 16 x cols), by plain loops.
-fn naive(q: &[i8], padded: usize, w: &[i8], cols: usize, row: usize, out: usize) -> i32 {
-    (0..cols).map(|k| i32::from(q[row * padded + k]) * i32::from(w[out * cols + k])).sum()
+fn naive(q: &[i8], stride: usize, w: &[i8], cols: usize, row: usize, out: usize) -> i32 {
+    (0..cols).map(|k| i32::from(q[row * stride + k]) * i32::from(w[out * cols + k])).sum()
 }
 
 /// Runs every available variant on `rows` x `cols` with weights and activations of the given kind, against plain loops.
 fn compare(random: &mut Random, rows: usize, cols: usize, w: &[i8], x: impl Fn(&mut Random) -> i8) {
     let padded = cols.next_multiple_of(GROUP);
-    let mut q = vec![0i8; rows * padded + 1];
+    let stride = padded + 64 * random.below(2);
+    let mut q = vec![0i8; rows * stride + 1];
     for r in 0..rows {
-        (0..cols).for_each(|c| q[1 + r * padded + c] = x(random));
+        (0..cols).for_each(|c| q[1 + r * stride + c] = x(random));
     }
     let q = &q[1..];
     let wide: Vec<i16> = std::iter::once(0).chain(q.iter().map(|&v| v.into())).collect();
-    let sums: Vec<i32> = q.chunks_exact(GROUP).map(|g| g.iter().map(|&v| i32::from(v)).sum()).collect();
+    let sums: Vec<i32> = (0..rows)
+        .flat_map(|r| q[r * stride..][..padded].chunks_exact(GROUP))
+        .map(|g| g.iter().map(|&v| i32::from(v)).sum())
+        .collect();
     let first = random.below(3);
     let panels = (1 + random.below(4)).min(6 - first);
     for v in available(VARIANTS) {
@@ -29,13 +33,13 @@ fn compare(random: &mut Random, rows: usize, cols: usize, w: &[i8], x: impl Fn(&
             weights[geo.at(i / cols, i % cols)] = geo.encode(w);
         }
         let wide = if v.run.wide { &wide[1..] } else { &[] };
-        let job = Job { q, wide, sums: &sums, rows, weights, geo, first, panels };
+        let job = Job { q, wide, sums: &sums, stride, rows, weights, geo, first, panels };
         let mut tile: Tile<i32> = [[7; TILE_COLS]; 16];
         // SAFETY: `available` yields only what this CPU can run.
         unsafe { (v.run.run)(&job, &mut tile) };
         for (r, row) in tile[..rows].iter().enumerate() {
             for (c, &got) in row[..panels * NR].iter().enumerate() {
-                let want = naive(q, padded, w, cols, r, first * NR + c);
+                let want = naive(q, stride, w, cols, r, first * NR + c);
                 assert_eq!(got, want, "{} {rows} x {cols}, {panels} panels at ({r},{c})", v.name);
             }
         }
