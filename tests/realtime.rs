@@ -71,7 +71,8 @@ fn a_running_session_does_not_allocate() {
         session.push_agent_audio(agent.next().unwrap(), inputs.rate).unwrap();
         session.push_user_audio(user.next().unwrap(), inputs.rate).unwrap();
 
-        let samplers = [Sampler::Midpoint(4), Sampler::Single, Sampler::Midpoint(1), Sampler::Euler(8), Sampler::Midpoint(2)];
+        let samplers =
+            [Sampler::Midpoint(4), Sampler::Single, Sampler::Midpoint(1), Sampler::Euler(8), Sampler::Midpoint(2)];
         let calls = allocations(|| {
             for block in 0..100 {
                 session.set_sampler(samplers[block / 7 % samplers.len()]).unwrap();

@@ -3,7 +3,8 @@
 #[path = "../examples/synthetic_person/person.rs"]
 mod person;
 
-use visavis::export::viewer::{Meta, render};
+use visavis::error::ErrorKind;
+use visavis::export::viewer::{Meta, render, write};
 use visavis::metrics::Summary;
 
 #[test]
@@ -31,4 +32,11 @@ fn the_person_is_measured_as_it_was_made() {
     assert!(summary.head_angle.unwrap() > 0.9);
     assert!(summary.bone_deviation.unwrap().max < 1e-3);
     assert!(summary.speaking.unwrap().wrist_speed > summary.non_speaking.unwrap().wrist_speed);
+}
+
+#[test]
+fn an_unwritable_page_is_an_error_that_names_it() {
+    let path = std::env::temp_dir().join("visavis-no-such-folder").join("index.html");
+    let error = write(&path, &person::recording(0.2), &Meta::default()).unwrap_err();
+    assert_eq!((error.kind(), error.path()), (ErrorKind::Io, Some(path.as_path())));
 }

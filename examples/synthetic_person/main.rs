@@ -3,7 +3,7 @@
 mod person;
 
 use std::process::ExitCode;
-use visavis::export::viewer::{Meta, render};
+use visavis::export::viewer::{self, Meta};
 
 fn main() -> ExitCode {
     let path = std::env::args().nth(1).unwrap_or_else(|| "synthetic.html".to_owned());
@@ -15,13 +15,13 @@ fn main() -> ExitCode {
             ("Voices".to_owned(), "synthetic syllables".to_owned()),
         ],
     };
-    match std::fs::write(&path, render(&person::recording(30.0), &meta)) {
+    match viewer::write(&path, &person::recording(30.0), &meta) {
         Ok(()) => {
             println!("{path}");
             ExitCode::SUCCESS
         }
         Err(error) => {
-            eprintln!("{path}: cannot write the page: {error}");
+            eprintln!("{error}");
             ExitCode::FAILURE
         }
     }

@@ -9,7 +9,10 @@
 
 mod data;
 
+use crate::error::Result;
+use crate::export::write_atomically;
 use crate::recording::Recording;
+use std::path::Path;
 
 /// What the page says about a recording, beside its data.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -50,6 +53,14 @@ pub fn render(recording: &Recording, meta: &Meta) -> String {
     let data = data::json(recording, meta);
     let title = escape_html(&meta.title);
     fill(PAGE, &[("title", &title), ("style", STYLE), ("script", &script), ("data", &data)])
+}
+
+/// Writes [`render`]'s page to `path`; the file appears whole or not at all.
+///
+/// # Errors
+/// Those of [`write_atomically`]: [`Io`](crate::error::ErrorKind::Io) naming `path` when it cannot be written.
+pub fn write(path: impl AsRef<Path>, recording: &Recording, meta: &Meta) -> Result<()> {
+    write_atomically(path, |out| out.write_all(render(recording, meta).as_bytes()))
 }
 
 /// `template` with each `{{name}}` replaced, in one pass: what is put in is not searched again.
