@@ -114,7 +114,7 @@ def main():
     held = Windows(os.path.join(args.cache, "val.pt"), args.blocks, 0, 0, 0, 0, jitter=False)
     vae, mean, std, _ = load_vae(args.vae)
     plain = Windows(os.path.join(args.cache, "train.pt"), 16, jitter=False)
-    metric = latent_metric(vae, mean, std, plain.batch(48)[0], train.mean, train.std)
+    metric = latent_metric(vae, mean, std, plain.batch(24)[0], train.mean, train.std)
     state = torch.load(args.out, weights_only=False) if args.resume else torch.load(args.init, weights_only=False) if args.init else None
     size = state["size"] if state else SIZES[args.size]
     latent, width_a = train.items[0]["z"][0].shape[-1], train.items[0]["agent"].shape[-1]
@@ -157,7 +157,7 @@ def main():
             row = {k: sum(v) / len(v) for k, v in seen.items() if v}
             seen = {"shared": [], "apart": []}
             log.write(step=step, minutes=clock.elapsed / 60, **row, **(validate(ema.net, checks, metric) if step % 500 == 0 else {}))
-            if step % 500 == 0:
+            if step % 500 == 0 or step in (100, 200):
                 keep()
     log.write(step=step, minutes=clock.elapsed / 60, **validate(ema.net, checks, metric))
     keep()
