@@ -76,6 +76,22 @@ def apart_loss(net, z, cond, metric, slip):
 
 
 @torch.no_grad()
+def error_factor(path, cache, tau=0.8, batches=4):
+    """Matrix that turns white noise into noise like the flow's x1 errors at `tau`, in latents as the encoder gives them [Dz, Dz]."""
+    state = torch.load(path, weights_only=False)
+    net = FlowNet(state["latent"], state["audio"], **state["size"])
+    net.load_state_dict(state["ema"])
+    data, errors = Windows(os.path.join(cache, "train.pt"), 64), []
+    for _ in range(batches):
+        z, cond = data.batch(12)
+        t = torch.full((len(z), 1), tau)
+        errors.append((net(noisy(z, t, torch.randn_like(z)), t, cond) - z)[:, 8:].flatten(0, 1))
+    errors = torch.cat(errors) * state["latent_std"]
+    covariance = errors.T @ errors / len(errors)
+    return torch.linalg.cholesky(covariance + 1e-6 * covariance.trace() / len(covariance) * torch.eye(len(covariance)))
+
+
+@torch.no_grad()
 def validate(net, batches, metric):
     """x1 error by flow time, conditional against unconditional."""
     out = {}

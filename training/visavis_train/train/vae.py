@@ -101,6 +101,8 @@ def main():
     parser.add_argument("--init", help="checkpoint whose weights to start from (schedule starts anew)")
     parser.add_argument("--decoder-only", action="store_true",
                         help="with --init: go on with the decoder alone, so that latents (and a flow trained on them) stay valid; latents get noise")
+    parser.add_argument("--errors", nargs=2, metavar=("FLOW", "CACHE"),
+                        help="with --decoder-only: the noise is like the errors of this flow, so that the decoder does not turn them into jitter")
     parser.add_argument("--resume", action="store_true")
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
@@ -128,7 +130,11 @@ def main():
     if args.decoder_only:
         net.encoder.requires_grad_(False)
         with torch.no_grad():
-            spread = net.encoder((train.sample(16, frames) - mean) / std)[0].flatten(0, 1).std(0)
+            if args.errors:
+                from .flow import error_factor
+                noise_map = error_factor(*args.errors)
+            else:
+                noise_map = NOISE * torch.diag(net.encoder((train.sample(16, frames) - mean) / std)[0].flatten(0, 1).std(0))
     optim, ema = common.optimiser(net, args.lr), common.Ema(net, 0.998)
     clock, step = common.Clock(args.minutes), 0
     if state:
@@ -146,8 +152,8 @@ def main():
             if args.decoder_only:
                 with torch.no_grad():
                     mu, logvar = (t.float() for t in net.encoder(x))
-                noise = spread * NOISE * torch.rand(len(mu), 1, 1)
-                y = net.decoder(mu + noise * torch.randn_like(mu)).float()
+                noise = (torch.randn_like(mu) @ noise_map.T) * torch.rand(len(mu), 1, 1)
+                y = net.decoder(mu + noise).float()
             else:
                 y, mu, logvar = net(x)
         parts = losses(x, y, mean, std, mu, logvar, weights, jw)
