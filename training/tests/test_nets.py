@@ -70,7 +70,7 @@ def test_cached_stream_equals_full_recomputation(tau_history):
     net, b, idle = flow(4), 2, 5
     conds, eps, start = conditions(b, 10), torch.randn(b, 10, 8), torch.randn(b, idle, 8)
     noise, none = torch.randn(b, idle, 8), absent(b, idle, 6)
-    stream = Stream(net, b, 1.3, 2.5, gaze=True, steps=2, tau_history=tau_history)
+    stream = Stream(net, b, 1.3, 2.5, gaze=True, steps=2, tau_history=tau_history, single=tau_history is not None)
     stream.warm(start, noise, none)
     references = [Reference(net, 1.3, 2.5) for _ in range(b)]
     row = lambda c, i: c.map(lambda t: t[i:i + 1])

@@ -80,18 +80,21 @@ class Cache:
 class Stream:
     """Streams `batch` sequences at once. Time of network evaluations is proportional to the rows, not to the history."""
 
-    def __init__(self, net, batch, guidance=1.3, gaze_guidance=2.5, gaze=False, steps=4, tau_history=None):
-        """With `tau_history` the network is a single-step student: one branch, one slot."""
-        self.net, self.batch, self.steps, self.tau_history = net, batch, steps, tau_history
+    def __init__(self, net, batch, guidance=1.3, gaze_guidance=2.5, gaze=False, steps=4, tau_history=None, single=False):
+        """`single`: the network is a single-step student, one branch. `tau_history`: history enters at this flow time in every
+        evaluation (always so for a student); without it, at the flow time of the evaluation."""
+        if single and tau_history is None:
+            raise ValueError("a single-step student needs tau_history")
+        self.net, self.batch, self.steps, self.tau_history, self.single = net, batch, steps, tau_history, single
         self.guidance, self.gaze_guidance, self.gaze = guidance, gaze_guidance, gaze
-        self.count = 1 if tau_history is not None else (3 if gaze else 2)
-        slots = 1 if tau_history is not None else 2 * steps
+        self.count = 1 if single else (3 if gaze else 2)
+        slots = 1 if single else 2 * steps
         self.caches = [Cache(net, self.count * batch) for _ in range(slots)]
         self.previous, self.position = None, 0
 
     def _stack(self, cond):
         """Embedded conditioning of the branches, once for all evaluations of a block: [count * B, 1, ...]."""
-        if self.tau_history is not None:
+        if self.single:
             return self.net.conditioning(cond if self.gaze else cond.dropped(GAZE))
         return self.net.conditioning(branches(cond, self.gaze))
 
@@ -152,7 +155,7 @@ class Stream:
             taus = torch.tensor([[history, tau]], dtype=torch.float32)
             return self._pass(self.caches[slot], torch.cat([done, z], 1), taus, torch.cat([before[2], now], 1))
 
-        if self.tau_history is not None:
+        if self.single:
             z = rows(eps, 0.0, 0)
         else:
             z = midpoint(self.steps, eps, lambda z, tau, slot: combine(rows(z, tau, slot), self.count, self.guidance, self.gaze_guidance))

@@ -76,6 +76,22 @@ def apart_loss(net, z, cond, metric, slip):
 
 
 @torch.no_grad()
+def error_factor(path, cache, tau=0.8, batches=4):
+    """Matrix that turns white noise into noise like the flow's x1 errors at `tau`, in latents as the encoder gives them [Dz, Dz]."""
+    state = torch.load(path, weights_only=False)
+    net = FlowNet(state["latent"], state["audio"], **state["size"])
+    net.load_state_dict(state["ema"])
+    data, errors = Windows(os.path.join(cache, "train.pt"), 64), []
+    for _ in range(batches):
+        z, cond = data.batch(12)
+        t = torch.full((len(z), 1), tau)
+        errors.append((net(noisy(z, t, torch.randn_like(z)), t, cond) - z)[:, 8:].flatten(0, 1))
+    errors = torch.cat(errors) * state["latent_std"]
+    covariance = errors.T @ errors / len(errors)
+    return torch.linalg.cholesky(covariance + 1e-6 * covariance.trace() / len(covariance) * torch.eye(len(covariance)))
+
+
+@torch.no_grad()
 def validate(net, batches, metric):
     """x1 error by flow time, conditional against unconditional."""
     out = {}
@@ -114,7 +130,7 @@ def main():
     held = Windows(os.path.join(args.cache, "val.pt"), args.blocks, 0, 0, 0, 0, jitter=False)
     vae, mean, std, _ = load_vae(args.vae)
     plain = Windows(os.path.join(args.cache, "train.pt"), 16, jitter=False)
-    metric = latent_metric(vae, mean, std, plain.batch(48)[0], train.mean, train.std)
+    metric = latent_metric(vae, mean, std, plain.batch(24)[0], train.mean, train.std)
     state = torch.load(args.out, weights_only=False) if args.resume else torch.load(args.init, weights_only=False) if args.init else None
     size = state["size"] if state else SIZES[args.size]
     latent, width_a = train.items[0]["z"][0].shape[-1], train.items[0]["agent"].shape[-1]
@@ -157,7 +173,7 @@ def main():
             row = {k: sum(v) / len(v) for k, v in seen.items() if v}
             seen = {"shared": [], "apart": []}
             log.write(step=step, minutes=clock.elapsed / 60, **row, **(validate(ema.net, checks, metric) if step % 500 == 0 else {}))
-            if step % 500 == 0:
+            if step % 500 == 0 or step in (100, 200):
                 keep()
     log.write(step=step, minutes=clock.elapsed / 60, **validate(ema.net, checks, metric))
     keep()

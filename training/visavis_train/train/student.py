@@ -62,7 +62,7 @@ class Rollouts:
         cond = Condition(user.flatten(2), agent, voice, g, flags[:, None].repeat(1, n, 1))
         cond = targets(cond, gaze)
         eps, root, worlds = torch.randn_like(z), torch.stack(starts), torch.stack(worlds)
-        stream = Stream(net, size, gaze=gaze, tau_history=tau_history)
+        stream = Stream(net, size, gaze=gaze, tau_history=tau_history, single=True)
         at = lambda c, k: c.map(lambda t: t[:, k:k + 1])
         stream.warm(z[:, :warm], eps[:, :warm], cond.map(lambda t: t[:, :warm]))
         decoder, place = DecoderStream(self.decoder, size), lambda z: z * w.std + w.mean

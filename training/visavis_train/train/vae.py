@@ -19,6 +19,7 @@ from .geometry import FEET, HANDS, ROOT, integrate, local_positions, to_world
 SIZES = {"base": dict(latent=64, layers=4, width=192, heads=4, mlp=4, window_blocks=16),
          "paper": dict(latent=256, layers=9, width=256, heads=4, mlp=4, window_blocks=16)}
 HORIZON = 16
+NOISE = 0.1  # greatest noise on latents when the decoder is trained alone, in deviations of the latents
 JOINT_WEIGHTS = {5: 2.0, 8: 1.5, 12: 1.5, 9: 3.0, 13: 3.0, 16: 2.0, 17: 2.0, 20: 2.0, 21: 2.0}
 
 
@@ -98,6 +99,10 @@ def main():
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--limit", type=int, help="take at most this many clips")
     parser.add_argument("--init", help="checkpoint whose weights to start from (schedule starts anew)")
+    parser.add_argument("--decoder-only", action="store_true",
+                        help="with --init: go on with the decoder alone, so that latents (and a flow trained on them) stay valid; latents get noise")
+    parser.add_argument("--errors", nargs=2, metavar=("FLOW", "CACHE"),
+                        help="with --decoder-only: the noise is like the errors of this flow, so that the decoder does not turn them into jitter")
     parser.add_argument("--resume", action="store_true")
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
@@ -114,21 +119,29 @@ def main():
     else:
         mean, std, every = statistics(train)
         features = len(mean)
-    net, weights = Vae(features, **size), channel_weights(features)
+    net, weights, frames = Vae(features, **size), channel_weights(features), 4 * args.blocks
     jw = joint_weights((features - ROOT) // 36)
     jw = jw / jw.mean()
     if first:
-        net.load_state_dict(first["net"])
+        net.load_state_dict(first["ema" if args.decoder_only else "net"])
     else:
         start_from_principal(net, (every - mean) / std, weights)
         del every
+    if args.decoder_only:
+        net.encoder.requires_grad_(False)
+        with torch.no_grad():
+            if args.errors:
+                from .flow import error_factor
+                noise_map = error_factor(*args.errors)
+            else:
+                noise_map = NOISE * torch.diag(net.encoder((train.sample(16, frames) - mean) / std)[0].flatten(0, 1).std(0))
     optim, ema = common.optimiser(net, args.lr), common.Ema(net, 0.998)
     clock, step = common.Clock(args.minutes), 0
     if state:
         optim.load_state_dict(state["optim"])
         ema.net.load_state_dict(state["ema"])
         clock, step, ema.steps = common.Clock(args.minutes, state["elapsed"]), state["step"], state["step"]
-    log, frames = common.Log(args.out + ".jsonl", args.resume), 4 * args.blocks
+    log = common.Log(args.out + ".jsonl", args.resume)
     torch.manual_seed(1)
     check = ((held if held.items else train).sample(32, frames) - mean) / std
     torch.manual_seed(2 + step)
@@ -136,7 +149,13 @@ def main():
     while clock.progress < 1:
         x = (train.sample(args.batch, frames) - mean) / std
         with torch.autocast("cpu", torch.bfloat16):
-            y, mu, logvar = net(x)
+            if args.decoder_only:
+                with torch.no_grad():
+                    mu, logvar = (t.float() for t in net.encoder(x))
+                noise = (torch.randn_like(mu) @ noise_map.T) * torch.rand(len(mu), 1, 1)
+                y = net.decoder(mu + noise).float()
+            else:
+                y, mu, logvar = net(x)
         parts = losses(x, y, mean, std, mu, logvar, weights, jw)
         loss = sum(v for k, v in parts.items() if k != "kl") + args.kl * parts["kl"]
         common.set_rate(optim, common.rate(args.lr, step, clock.progress))

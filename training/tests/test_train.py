@@ -1,0 +1,183 @@
+"""Training pieces on synthetic motion: representation, losses, windows, teacher, export."""
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from visavis_train import bundle, make_tiny
+from visavis_train.motion import features, rig
+from visavis_train.nets.audio import AudioEncoder
+from visavis_train.nets.flow import GAZE, Condition, FlowNet
+from visavis_train.nets.stream import Reference, branches
+from visavis_train.train import audio, cache, common, data, flow, geometry, student, vae, windows
+
+
+@pytest.fixture(autouse=True)
+def seeded():
+    torch.manual_seed(0)
+    torch.set_num_threads(1)
+
+
+def walker(frames=160):
+    """A body that walks a curve while it sways: world positions [T, J, 3] and quaternions [T, J, 4]."""
+    x = make_tiny.sway(frames)
+    x[1:, 0], x[1:, 1], x[1:, 2] = 0.004, 0.02, 0.01
+    return features.from_features(x.numpy())
+
+
+def small_flow():
+    return make_tiny.lively(FlowNet(8, 6, layers=2, width=32, heads=4, mlp=2, tau_width=16, window_blocks=5, embed_latent=16, embed_user=8,
+                                    embed_voice=12, embed_gaze=4))
+
+
+def item(frames=160, latent=8):
+    p, q = walker(frames)
+    c, roots = data.compact(p, q)
+    k = [(frames - o) // 4 for o in cache.PHASES]
+    return {"name": "a", "z": [torch.randn(n, latent) for n in k], "roots": torch.from_numpy(roots), "user": torch.randn(frames, 3) + 2,
+            "gaze": torch.rand(frames), "agent": torch.randn(frames, 6).half(), "voice": torch.randn(frames, 6).half(), "has": (True, False)}
+
+
+def made_windows(tmp_path, blocks=16, **kw):
+    path = str(tmp_path / "train.pt")
+    torch.save({"items": [item(), item()], "latent_mean": torch.zeros(8), "latent_std": torch.ones(8)}, path)
+    return windows.Windows(path, blocks, **kw)
+
+
+def test_compact_frames_expand_to_the_feature_vector():
+    p, q = walker()
+    c, roots = data.compact(p, q)
+    assert np.allclose(data.expand(torch.from_numpy(c)).numpy(), features.to_features(p, q), atol=1e-5)
+    assert np.allclose(roots[:, :2], p[:, 0, [0, 2]], atol=1e-6)
+
+
+def test_integrated_roots_and_positions_equal_the_world():
+    p, q = walker()
+    x = torch.from_numpy(features.to_features(p, q)).float()
+    _, roots = data.compact(p, q)
+    start = torch.from_numpy(roots[0]).float()
+    path = geometry.integrate(x[1:, :3], start)
+    assert np.allclose(path.numpy(), roots[1:], atol=1e-3)
+    assert np.allclose(geometry.to_world(path, geometry.local_positions(x[1:])).numpy(), p[1:], atol=2e-3)
+
+
+def test_user_in_the_agents_frame_and_back():
+    roots = torch.tensor([[1.0, -2.0, math.pi / 2]])
+    local = geometry.to_local(roots, torch.tensor([[[3.0, -2.0]]]))
+    assert torch.allclose(local, torch.tensor([[[0.0, 2.0]]]), atol=1e-6)  # facing +X, a user at +X is straight ahead
+    world = geometry.to_world(roots, torch.tensor([[[0.0, 0.0, 2.0]]]))
+    assert torch.allclose(world, torch.tensor([[[3.0, 0.0, -2.0]]]), atol=1e-6)
+
+
+def test_gaze_equals_the_corpus_definition():
+    p, q = walker()
+    c, roots = data.compact(p, q)
+    user = np.tile([0.5, 1.6, 2.0], (len(p), 1))
+    want = rig.gaze_score(p, rig.quat_to_mat(q), user)
+    got = geometry.gaze(torch.from_numpy(roots).float(), data.expand(torch.from_numpy(c)), torch.from_numpy(user).float(), rig.EYES, rig.HEAD_BACK)
+    assert np.allclose(got.numpy(), want, atol=1e-3)
+
+
+def test_vae_losses_vanish_for_a_perfect_reconstruction_and_see_the_root():
+    x = make_tiny.sway(64)[None]
+    mean, std = x[0].mean(0), torch.full((x.shape[-1],), 0.05)
+    s = (x - mean) / std
+    w, jw = vae.channel_weights(x.shape[-1]), vae.joint_weights(22)
+    mu = logvar = torch.zeros(1, 16, 4)
+    parts = vae.losses(s, s, mean, std, mu, logvar, w, jw)
+    assert parts["feature"] == 0 and parts["kl"] == 0 and parts["position"] < 1e-2
+    moved = s.clone()
+    moved[..., 2] += 0.02 / 0.05
+    assert vae.losses(s, moved, mean, std, mu, logvar, w, jw)["position"] > parts["position"] + 0.1
+
+
+def test_principal_start_reconstructs_better_than_chance():
+    x = make_tiny.sway(400)
+    mean, std = x.mean(0), torch.full((x.shape[-1],), 0.05)
+    s, net = (x - mean) / std, vae.Vae(x.shape[-1], 4, 1, 32, 4, 2, 4)
+    vae.start_from_principal(net, s, vae.channel_weights(x.shape[-1]))
+    code = net.encoder.frame(s)
+    assert code.shape == (400, 32) and code.std() > 0.1
+    basis = net.decoder.out.weight
+    shape = torch.linalg.lstsq(basis, s.T).solution
+    assert (basis @ shape - s.T).square().mean() < 0.05 * s.square().mean()
+
+
+def test_windows_delay_the_user_one_block_and_mark_absent_voices(tmp_path):
+    w = made_windows(tmp_path, drop=0, drop_all=0, drop_gaze=0, prefix=0, jitter=False)
+    it = w.items[0]
+    z, user, agent, voice, g, flags = w.cut(it, 1, 3, 16)
+    first = cache.PHASES[1] + 12
+    assert torch.equal(z, it["z"][1][3:19])
+    assert torch.equal(agent[0], it["agent"][first:first + 4].float().reshape(-1))
+    assert torch.equal(voice[1], it["voice"][first:first + 4].float().reshape(-1))
+    want = geometry.to_local(it["roots"][first - 1], it["user"][first - 4:first][:, [0, 2]].double()).float()
+    assert torch.allclose(user[0], want, atol=1e-6)
+    assert flags.tolist() == [1, 1, 0, 1]
+
+
+def test_dropout_clears_flags_at_about_its_rate(tmp_path):
+    w = made_windows(tmp_path, drop=0.05, drop_all=0.1, drop_gaze=0.35, prefix=0.0)
+    flags = torch.cat([w.batch(64)[1].flags for _ in range(8)])
+    assert 0.75 < flags[..., 0].mean() < 0.95 and 0.45 < flags[..., GAZE].mean() < 0.72 and flags[..., 2].sum() == 0
+
+
+def test_teacher_over_a_window_equals_sampling_block_by_block():
+    net, t = small_flow(), 7
+    history, eps = torch.randn(1, t, 8), torch.randn(1, t, 8)
+    cond = Condition(torch.randn(1, t, 8), torch.randn(1, t, 24), torch.randn(1, t, 24), torch.rand(1, t, 4), torch.ones(1, t, 4))
+    got = student.teach(net, history, eps, cond, True, 1.3, 2.5, steps=2)
+    r = Reference(net, 1.3, 2.5)
+    at = lambda k: branches(cond.map(lambda c: c[:, k:k + 1]), True)
+    r.push(history[:, :1], eps[:, :1], at(0))
+    for k in range(1, t):
+        with torch.no_grad():
+            want = r.sample(eps[:, k:k + 1], at(k), 2)[0]
+        assert (got[:, k:k + 1] - want).abs().max() < 0.15 * want.abs().max()  # bf16 against fp32
+        r.push(history[:, k:k + 1], eps[:, k:k + 1], at(k))
+
+
+def test_flow_losses_fall_when_trained(tmp_path):
+    w, net = made_windows(tmp_path), FlowNet(8, 6, layers=1, width=32, heads=4, mlp=2, tau_width=16, window_blocks=5, embed_latent=16,
+                                             embed_user=8, embed_voice=12, embed_gaze=4)
+    optim, metric, seen = common.optimiser(net, 3e-3), torch.eye(8), []
+    for step in range(60):
+        z, cond = w.batch(8)
+        loss = (flow.shared_loss if step % 2 else flow.apart_loss)(net, z, cond, metric, 0.1)
+        optim.zero_grad()
+        loss.backward()
+        optim.step()
+        seen.append(loss.item())
+    assert sum(seen[-10:]) < 0.9 * sum(seen[:10])
+
+
+def test_audio_targets_hear_pitch_and_loudness():
+    t = torch.arange(24000) / 24000
+    tone = lambda f: sum((2 * math.pi * f * h * t).sin() / h for h in range(1, 8))[None] * 0.1
+    low, high = audio.targets(tone(110.0))[0, 10], audio.targets(tone(220.0))[0, 10]
+    assert abs((high[-1] - low[-1]) / 2 - math.log(2)) < 0.1 and low[-2] > 1
+    assert audio.targets(tone(110.0) * 0.1)[0, 10, -4] < low[-4] - 1
+    assert audio.targets(torch.zeros(1, 8000)).abs().max() < 4
+
+
+def test_audio_standardise_gives_unit_features():
+    net = make_tiny.lively(AudioEncoder(make_tiny.AUDIO, 8), 1.6)
+    wave = 0.1 * torch.randn(8, 800 * 30)
+    audio.standardise(net, wave)
+    y = net(wave).detach().flatten(0, 1)
+    assert torch.allclose(y.mean(0), torch.zeros(8), atol=1e-3) and torch.allclose(y.std(0), torch.ones(8), atol=1e-2)
+
+
+def test_rate_rises_then_falls():
+    assert common.rate(1.0, 0, 0.0, 100) < common.rate(1.0, 99, 0.0, 100) == 1.0
+    assert common.rate(1.0, 1000, 1.0, 100) == pytest.approx(0.02)
+
+
+def test_loading_a_bundle_says_what_is_missing(tmp_path):
+    tensors, config = make_tiny.build()
+    del tensors["flow.layers.1.qkv.weight"]
+    path = str(tmp_path / "b.safetensors")
+    bundle.write(path, tensors, config)
+    with pytest.raises(KeyError, match="flow.layers.1.qkv.weight"):
+        bundle.read(path)
