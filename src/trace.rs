@@ -71,7 +71,8 @@ pub fn trace(engine: &Arc<Engine>, input: &TraceInput, options: SessionOptions) 
     }
     let mut recorder = Recorder::default();
     let mut voices = [&input.agent_voice, &input.user_voice].map(|v| v.as_deref().unwrap_or_default().chunks(3200));
-    let mut path = input.user_path.iter().flatten().enumerate().map(|(i, p)| (*p, i as f64 / f64::from(FPS))).peekable();
+    let mut path =
+        input.user_path.iter().flatten().enumerate().map(|(i, p)| (*p, i as f64 / f64::from(FPS))).peekable();
     for _ in 0..input.blocks {
         let now = session.next_due();
         if let Some(samples) = voices[0].next() {

@@ -59,7 +59,8 @@ fn trace_equals_pytorch() {
         let values: Vec<_> = view.data().chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
         (view.shape().to_vec(), values)
     };
-    let stages = ["conditioning.user", "conditioning.flags", "x1.0", "x1.19", "latents", "agent_features", "roots", "positions"];
+    let stages =
+        ["conditioning.user", "conditioning.flags", "x1.0", "x1.19", "latents", "agent_features", "roots", "positions"];
     for name in stages {
         let ((shape, ours), (expected_shape, expected)) = (read(name), golden.get(name));
         assert_eq!(shape, expected_shape, "{name}");

@@ -115,7 +115,9 @@ fn help_tells_the_commands() {
         assert!(help.contains(word), "{help}");
     }
     let help = succeeds(&["generate", "--help"]);
-    for word in ["--agent", "--user-path", "--gaze", "--sampler", "--guidance", "--gaze-guidance", "--seed", "--threads"] {
+    for word in
+        ["--agent", "--user-path", "--gaze", "--sampler", "--guidance", "--gaze-guidance", "--seed", "--threads"]
+    {
         assert!(help.contains(word), "{help}");
     }
     assert_eq!(succeeds(&["--version"]).trim(), format!("visavis {}", env!("CARGO_PKG_VERSION")));
