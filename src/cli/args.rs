@@ -36,22 +36,22 @@ pub struct Gaze(pub Option<f32>);
 #[derive(Debug, Clone, Args)]
 pub struct RunArgs {
     /// How much the agent looks at the user, 0 (averted) to 1 (sustained eye contact), or off for what comes naturally
-    #[arg(long, value_name = "0..1|off", value_parser = gaze, default_value = "off")]
+    #[arg(long, value_name = "0..1|off", value_parser = gaze, default_value = "off", allow_negative_numbers = true)]
     pub gaze: Gaze,
     /// midpoint4, midpoint2, midpoint1, euler:N or single
     #[arg(long, value_name = "NAME", default_value = "midpoint4")]
     pub sampler: Sampler,
     /// Guidance weight, 0 to 20 (1 is none) [default: the model's]
-    #[arg(long, value_name = "W", value_parser = weight)]
+    #[arg(long, value_name = "W", value_parser = weight, allow_negative_numbers = true)]
     pub guidance: Option<f32>,
     /// Gaze guidance weight, 0 to 20 [default: the model's]
-    #[arg(long, value_name = "W", value_parser = weight)]
+    #[arg(long, value_name = "W", value_parser = weight, allow_negative_numbers = true)]
     pub gaze_guidance: Option<f32>,
     /// Bundle [default: models/visavis-base.safetensors here, beside the program, or in its source folder]
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
     /// Seed of the noise: same seed and inputs, same motion
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     pub seed: u64,
     /// Threads, 1 or 2; the motion is the same
     #[arg(long, value_name = "N", default_value = "1", value_parser = RangedU64ValueParser::<usize>::new().range(1..=2))]
@@ -113,13 +113,13 @@ pub struct TraceArgs {
     #[arg(long, value_name = "NAME", default_value = "midpoint4")]
     pub sampler: Sampler,
     /// Guidance weight, 0 to 20 (1 is none) [default: the model's]
-    #[arg(long, value_name = "W", value_parser = weight)]
+    #[arg(long, value_name = "W", value_parser = weight, allow_negative_numbers = true)]
     pub guidance: Option<f32>,
     /// Gaze guidance weight, 0 to 20 [default: the model's]
-    #[arg(long, value_name = "W", value_parser = weight)]
+    #[arg(long, value_name = "W", value_parser = weight, allow_negative_numbers = true)]
     pub gaze_guidance: Option<f32>,
     /// Seed of the noise where the input gives none
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     pub seed: u64,
 }
 

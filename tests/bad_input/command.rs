@@ -73,6 +73,7 @@ fn wrong_usage_is_exit_code_two() {
         (&["--agent", &wav, "--sampler", "euler:0"], "unknown sampler"),
         (&["--agent", &wav, "--guidance", "NaN"], "from 0 to 20"),
         (&["--agent", &wav, "--threads", "3"], "1..=2"),
+        (&["--agent", &wav, "--gaze", "-0.5"], "from 0 to 1, or off"),
         (&["--agent", &wav, "--seed", "-1"], "--seed"),
         (&["--agent"], "--agent"),
         (&[], "--agent"),
