@@ -10,6 +10,11 @@
 //!
 //! Kernels do not allocate, lock, or look at the environment; they take slices whose lengths the callers in this
 //! module have checked, and [`Exec`] owns threads and scratch.
+//!
+//! A level that the CPU lacks is compiled and neither run nor tested there; tests and benches take what is available. aarch64
+//! levels are tested under emulation (`cortex-a57`: NEON, `cortex-a76`: and dotprod, `max`: and i8mm).
+
+#![allow(clippy::needless_range_loop, reason = "tiles are indexed by row, panel and lane side by side")]
 
 mod attend;
 mod epilogue;
