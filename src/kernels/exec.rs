@@ -1,11 +1,10 @@
 //! [`Exec`]: kernels, threads and scratch of one session; the one object that networks call.
 
+use super::Kernels;
 use super::attend::{Head, KvCache, Span};
-use super::epilogue::{Finish, Sums};
-use super::matrix::{Body, Matrix};
-use super::packed::{Buffer, MAX_PANELS, MAX_ROWS, NR, TILE_COLS, Tile};
+use super::linear::LINE;
+use super::packed::{Buffer, MAX_ROWS};
 use super::quantize_rows::GROUP;
-use super::{Kernels, matmul_f32_f32, matmul_i8dx_i4g, matmul_i8dx_i8cx};
 use crate::error::{Error, ErrorKind, Result};
 use crate::par::{FlushToZero, Pool};
 
@@ -31,19 +30,6 @@ impl<'a> RowTable<'a> {
     }
 }
 
-/// What [`Exec::linear`] does with xW' + b.
-#[derive(Debug, Clone, Copy)]
-pub enum Epilogue<'a> {
-    /// y = xW' + b
-    Store,
-    /// y = gelu(xW' + b)
-    Gelu,
-    /// y += xW' + b
-    Add,
-    /// y += gate\[row\] * (xW' + b)
-    GatedAdd(RowTable<'a>),
-}
-
 /// Sizes that scratch is allocated for.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
@@ -62,19 +48,19 @@ pub struct Limits {
 ///
 /// Methods panic when lengths disagree with the shapes in their description: that is an error of the program.
 pub struct Exec {
-    kernels: Kernels,
-    pool: Pool,
-    width: usize,
-    x: Buffer,
-    q: Buffer,
-    wide: Buffer,
-    sums: Vec<i32>,
+    pub(super) kernels: Kernels,
+    pub(super) pool: Pool,
+    pub(super) width: usize,
+    pub(super) x: Buffer,
+    pub(super) q: Buffer,
+    pub(super) wide: Buffer,
+    pub(super) sums: Vec<i32>,
     flush: Option<FlushToZero>,
 }
 
 /// A pointer that the pieces of one run share; each writes a part of its own.
 #[derive(Clone, Copy)]
-struct Shared(*mut f32);
+pub(super) struct Shared(pub(super) *mut f32);
 // SAFETY: pieces that hold it write disjoint ranges, which each use argues.
 unsafe impl Sync for Shared {}
 
@@ -83,7 +69,7 @@ impl Shared {
     ///
     /// # Safety
     /// The range lies in the slice that the pointer came from, and no other reference to it lives meanwhile.
-    unsafe fn part<'a>(&self, from: usize, len: usize) -> &'a mut [f32] {
+    pub(super) unsafe fn part<'a>(&self, from: usize, len: usize) -> &'a mut [f32] {
         // SAFETY: promised by the caller.
         unsafe { std::slice::from_raw_parts_mut(self.0.add(from), len) }
     }
@@ -134,103 +120,6 @@ impl Exec {
     pub fn end(&mut self) {
         self.pool.end();
         self.flush = None;
-    }
-
-    /// y (`rows` x out) from x (`rows` x in): xW' + b and the epilogue.
-    pub fn linear(&mut self, w: &Matrix, x: &[f32], rows: usize, y: &mut [f32], e: Epilogue<'_>) {
-        assert_eq!(x.len(), rows * w.cols, "linear: x is rows x in_features");
-        assert_eq!(y.len(), rows * w.out, "linear: y is rows x out_features");
-        assert!(w.cols <= self.width, "linear: in_features within Limits::width");
-        for start in (0..rows).step_by(MAX_ROWS) {
-            let n = MAX_ROWS.min(rows - start);
-            let x = &x[start * w.cols..][..n * w.cols];
-            self.portion(w, x, start, n, &mut y[start * w.out..][..n * w.out], e);
-        }
-    }
-
-    /// At most 16 rows; `start` is the first one's number in gate tables.
-    fn portion(&mut self, w: &Matrix, x: &[f32], start: usize, rows: usize, y: &mut [f32], e: Epilogue<'_>) {
-        let Self { kernels, pool, x: padded, q, wide, sums, .. } = self;
-        let y = Shared(y.as_mut_ptr());
-        let panels = w.out.div_ceil(NR);
-        let tiles = panels.div_ceil(MAX_PANELS);
-        // Finishes one row of one tile; `sums` starts at the tile's first column.
-        let finish = |tile: usize, r: usize, sums: Sums<'_>| {
-            let from = tile * TILE_COLS;
-            let len = TILE_COLS.min(w.out - from);
-            let finish = match e {
-                Epilogue::Store => Finish::Store,
-                Epilogue::Gelu => Finish::Gelu,
-                Epilogue::Add => Finish::Add,
-                Epilogue::GatedAdd(gate) => Finish::GatedAdd(gate.part(start + r, from, len)),
-            };
-            // SAFETY: row r and the tile's columns lie in y, and each tile is one piece.
-            let y = unsafe { y.part(r * w.out + from, len) };
-            // SAFETY: a `Kernels` exists only for a level that this CPU has.
-            unsafe { (kernels.epilogue.run)(sums, &w.bias[from..], finish, y) }
-        };
-        let span = |tile: usize| (tile * MAX_PANELS, MAX_PANELS.min(panels - tile * MAX_PANELS));
-
-        match &w.body {
-            Body::F32(buffer, geo, variant) => {
-                let (x, stride) = spread(x, rows, w.cols, geo.padded(), padded);
-                let weights = buffer.of::<f32>();
-                pool.run(tiles, &|t| {
-                    let (first, panels) = span(t);
-                    let mut tile: Tile<f32> = [[0.0; TILE_COLS]; MAX_ROWS];
-                    let job = matmul_f32_f32::Job { x, stride, rows, weights, geo: *geo, first, panels };
-                    // SAFETY: a matrix holds a variant that this CPU can run.
-                    unsafe { (variant.run)(&job, &mut tile) };
-                    (0..rows).for_each(|r| finish(t, r, Sums::F32(&tile[r])));
-                });
-            }
-            Body::F16(buffer, geo, variant) => {
-                let (x, stride) = spread(x, rows, w.cols, geo.padded(), padded);
-                let weights = buffer.of::<half::f16>();
-                pool.run(tiles, &|t| {
-                    let (first, panels) = span(t);
-                    let mut tile: Tile<f32> = [[0.0; TILE_COLS]; MAX_ROWS];
-                    let job = matmul_f32_f32::Job { x, stride, rows, weights, geo: *geo, first, panels };
-                    // SAFETY: a matrix holds a variant that this CPU can run.
-                    unsafe { (variant.run)(&job, &mut tile) };
-                    (0..rows).for_each(|r| finish(t, r, Sums::F32(&tile[r])));
-                });
-            }
-            Body::I8(buffer, geo, scale, variant) => {
-                let stride = geo.padded + LINE;
-                let n = rows * stride;
-                let (q, sums) = (&mut q.of_mut::<i8>()[..n], &mut sums[..rows * geo.padded / GROUP]);
-                let x_scale = quantize(kernels, x, w.cols, geo.padded, q, sums);
-                let wide = &mut wide.of_mut::<i16>()[..if variant.run.wide { n } else { 0 }];
-                for (wide, q) in wide.iter_mut().zip(&*q) {
-                    *wide = i16::from(*q);
-                }
-                let (q, sums, wide, weights) = (&*q, &*sums, &*wide, buffer.of::<u8>());
-                pool.run(tiles, &|t| {
-                    let (first, panels) = span(t);
-                    let mut tile: Tile<i32> = [[0; TILE_COLS]; MAX_ROWS];
-                    let job = matmul_i8dx_i8cx::Job { q, wide, sums, stride, rows, weights, geo: *geo, first, panels };
-                    // SAFETY: a matrix holds a variant that this CPU can run.
-                    unsafe { (variant.run.run)(&job, &mut tile) };
-                    (0..rows).for_each(|r| finish(t, r, Sums::I32(&tile[r], x_scale[r], &scale[t * TILE_COLS..])));
-                });
-            }
-            Body::I4(buffer, geo, variant) => {
-                let stride = geo.padded() + LINE;
-                let (q, sums) = (&mut q.of_mut::<i8>()[..rows * stride], &mut sums[..rows * geo.groups]);
-                let x_scale = quantize(kernels, x, w.cols, geo.padded(), q, sums);
-                let (q, sums) = (&*q, &*sums);
-                let (weights, scales) = (buffer.of::<u8>(), buffer.of::<half::f16>());
-                pool.run(tiles, &|t| {
-                    let (first, panels) = span(t);
-                    let mut tile: Tile<f32> = [[0.0; TILE_COLS]; MAX_ROWS];
-                    let job = matmul_i8dx_i4g::Job { q, sums, stride, rows, weights, scales, geo: *geo, first, panels };
-                    // SAFETY: a matrix holds a variant that this CPU can run.
-                    unsafe { (variant.run)(&job, &mut tile) };
-                    (0..rows).for_each(|r| finish(t, r, Sums::Scaled(&tile[r], x_scale[r])));
-                });
-            }
-        }
     }
 
     /// Layer normalisation of each of `rows` rows of `dim` values, eps 1e-5: y = layernorm(x) * scale + shift, `scale` holding 1 + s.
@@ -358,39 +247,4 @@ fn ring<'a, T>(cache: &KvCache, k: &'a [T], v: &'a [T], span: Span, offset: usiz
         slot: cache.slot(span.first),
         len: span.len as usize,
     }
-}
-
-/// Values between two rows of scratch: rows a multiple of 4 KiB apart would compete for one set of the first-level cache.
-const LINE: usize = 64;
-
-/// `x` itself when its few rows have the padded length, else a copy with zeros behind each row; and the distance of its rows.
-fn spread<'a>(x: &'a [f32], rows: usize, cols: usize, padded: usize, scratch: &'a mut Buffer) -> (&'a [f32], usize) {
-    if cols == padded && rows <= 4 {
-        return (x, cols);
-    }
-    let stride = padded + LINE / 4;
-    let scratch = &mut scratch.of_mut::<f32>()[..rows * stride];
-    for (from, to) in x.chunks_exact(cols).zip(scratch.chunks_exact_mut(stride)) {
-        to[..cols].copy_from_slice(from);
-        to[cols..].fill(0.0);
-    }
-    (scratch, stride)
-}
-
-/// Quantises each row of `x` into rows of `q` that are `padded` and a line apart; returns the rows' scales.
-fn quantize(
-    kernels: &Kernels,
-    x: &[f32],
-    cols: usize,
-    padded: usize,
-    q: &mut [i8],
-    sums: &mut [i32],
-) -> [f32; MAX_ROWS] {
-    let mut scales = [0.0; MAX_ROWS];
-    let rows = x.chunks_exact(cols).zip(q.chunks_exact_mut(padded + LINE)).zip(sums.chunks_exact_mut(padded / GROUP));
-    for (scale, ((x, q), sums)) in scales.iter_mut().zip(rows) {
-        // SAFETY: a `Kernels` exists only for a level that this CPU has.
-        *scale = unsafe { (kernels.quantize.run)(x, &mut q[..padded], sums) };
-    }
-    scales
 }

@@ -51,8 +51,8 @@ pub(crate) fn silu(x: f32) -> f32 {
 /// GELU in its tanh form, 0.5 x (1 + tanh(sqrt(2/pi) (x + 0.044715 x^3))), as x / (1 + e^(-2u)) with u the argument of tanh.
 #[inline(always)]
 pub(crate) fn gelu(x: f32) -> f32 {
-    const A: f32 = -1.595_769_1; // -2 sqrt(2/pi)
-    const B: f32 = -0.071_354_82; // 0.044715 A
+    const A: f32 = -2.0 * 0.797_884_6; // sqrt(2/pi)
+    const B: f32 = 0.044_715 * A;
     let e = exp(x * (x * x).mul_add(B, A));
     x / (1.0 + e)
 }

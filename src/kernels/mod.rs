@@ -10,6 +10,11 @@
 //!
 //! Kernels do not allocate, lock, or look at the environment; they take slices whose lengths the callers in this
 //! module have checked, and [`Exec`] owns threads and scratch.
+//!
+//! A level that the CPU lacks is compiled and neither run nor tested there; tests and benches take what is available.
+//! aarch64 levels are tested under emulation (`cortex-a57`: NEON, `cortex-a76`: and dotprod, `max`: and i8mm).
+
+#![allow(clippy::needless_range_loop, reason = "tiles are indexed by row, panel and lane side by side")]
 
 mod attend;
 mod epilogue;
@@ -18,6 +23,7 @@ mod exec;
 mod exec_tests;
 mod gelu;
 mod level;
+mod linear;
 mod math;
 mod matmul_f32_f16;
 mod matmul_f32_f32;
@@ -33,8 +39,9 @@ mod rope;
 mod testing;
 
 pub use attend::{KvCache, KvDtype, Span};
-pub use exec::{Epilogue, Exec, Limits, RowTable};
+pub use exec::{Exec, Limits, RowTable};
 pub use level::Level;
+pub use linear::Epilogue;
 pub use matrix::{I4_GROUP, Matrix, WeightData, Weights};
 
 use crate::error::{Error, ErrorKind, Result};
