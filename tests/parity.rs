@@ -27,7 +27,8 @@ impl Probe for Stages {
 fn stages(golden: &Golden, sampler: Sampler, cache: KvDtype) -> BTreeMap<&'static str, Vec<f32>> {
     let engine = tiny();
     let gaze = Some(golden.values("gaze")[0]);
-    let options = SessionOptions { sampler, gaze, cache, anchoring: Anchoring::Never, ..Default::default() };
+    let options =
+        SessionOptions { sampler, gaze, cache, anchoring: Anchoring::Never, stance: false, ..Default::default() };
     let mut session = engine.session(options).expect("session");
     let mut noise = golden.values("eps_idle");
     noise.extend(golden.values("eps"));

@@ -109,7 +109,7 @@ impl fmt::Display for Contents {
         }
         writeln!(
             f,
-            "  delays   user {} blocks, agent's own voice {} blocks (a block is 133.3 ms)",
+            "  delays   in blocks of 133.3 ms: user {}, agent's own voice {}",
             c.user_delay_blocks, c.agent_delay_blocks
         )?;
         writeln!(f, "  rig      {} joints: {}", c.rig.joints.len(), joint_list(c))?;

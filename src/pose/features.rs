@@ -1,6 +1,7 @@
 //! Feature vectors to world transforms and back.
 
 use super::icosahedron::{decode, encode};
+use super::stance::Stance;
 use super::{Fit, Rig};
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{Frame, JOINT_CHANNELS, ROOT_CHANNELS, Root, Transform};
@@ -34,6 +35,7 @@ pub struct Decoder {
     radius: f32,
     root: Root,
     fit: Fit,
+    stance: Option<Stance>,
     kernels: Kernels,
     /// Joints in the heading frame.
     joints: Vec<Transform>,
@@ -51,12 +53,20 @@ impl Decoder {
             radius,
             root: Root::default(),
             fit: Fit::new(kernels, rig),
+            stance: None,
             kernels,
             joints: vec![Transform::IDENTITY; n],
             maps: vec![[0.0; 9]; n],
             rotations: vec![[0.0; 9]; n],
             previous: vec![Quat::IDENTITY; n],
         }
+    }
+
+    /// The same with each step of the root corrected so that planted feet stay where they are (`stance.rs`).
+    #[must_use]
+    pub fn with_stance(mut self, rig: &Rig) -> Self {
+        self.stance = Some(Stance::new(rig));
+        self
     }
 
     /// Length F of a feature vector.
@@ -73,6 +83,7 @@ impl Decoder {
     pub fn reset(&mut self, root: Root) {
         self.root = root;
         self.fit.reset();
+        self.stance.iter_mut().for_each(Stance::reset);
         self.previous.fill(Quat::IDENTITY);
     }
 
@@ -93,7 +104,6 @@ impl Decoder {
             ));
         }
         let (root, joints) = x.split_at(ROOT_CHANNELS);
-        self.root = self.root.advanced(root[0], root[1], root[2]);
         let vertices = joints.as_chunks::<JOINT_CHANNELS>().0;
         for ((joint, map), vertices) in self.joints.iter_mut().zip(&mut self.maps).zip(vertices) {
             (joint.position, *map) = decode(vertices, self.radius);
@@ -102,6 +112,9 @@ impl Decoder {
         for (joint, r) in self.joints.iter_mut().zip(&self.rotations) {
             joint.rotation = Quat::from_mat3(&Mat3::from_cols_array(r).transpose()).normalize();
         }
+        let step = [root[0], root[1], root[2]];
+        let [vx, vz, dyaw] = self.stance.as_mut().map_or(step, |stance| stance.correct(&self.joints, step));
+        self.root = self.root.advanced(vx, vz, dyaw);
         self.place(frame);
         self.fit.fit(&self.joints, &self.root, frame);
         Ok(())

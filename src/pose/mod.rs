@@ -13,6 +13,7 @@ mod gaze;
 mod humanoid;
 pub mod icosahedron;
 mod rig;
+mod stance;
 #[cfg(test)]
 pub(crate) mod synthetic;
 

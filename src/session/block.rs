@@ -49,17 +49,19 @@ impl BlockState {
         exec.begin();
         let generator = Generator::new(&mut exec, &engine.flow, student, &condition, generator_options);
         exec.end();
+        let rig = &engine.config.rig;
+        let motion = pose::Decoder::new(engine.kernels, rig, engine.config.pose.radius);
         let mut state = Self {
             inputs: Inputs::new(engine, options)?,
             generator,
             decoder: engine.decoder.state(options.cache),
             anchor: Anchor::new(engine, options),
-            motion: pose::Decoder::new(engine.kernels, &engine.config.rig, engine.config.pose.radius),
-            head: engine.config.rig.index("head").unwrap_or(0),
+            motion: if options.stance { motion.with_stance(rig) } else { motion },
+            head: rig.index("head").unwrap_or(0),
             noise: Noise::Seeded,
             latent: vec![0.0; engine.config.vae.latent],
             features: vec![0.0; BLOCK_FRAMES * engine.features()],
-            frames: (0..BLOCK_FRAMES).map(|_| Frame::empty(engine.config.rig.joints.len())).collect(),
+            frames: (0..BLOCK_FRAMES).map(|_| Frame::empty(rig.joints.len())).collect(),
             block: 0,
             exec,
         };

@@ -40,6 +40,8 @@ pub struct SessionOptions {
     pub cache: KvDtype,
     /// When recent motion is encoded anew.
     pub anchoring: Anchoring,
+    /// Whether the root's steps are corrected so that planted feet stay where they are; off for checks of the maths.
+    pub stance: bool,
     /// What runs the audio encoder.
     pub audio: AudioBackend,
 }
@@ -56,6 +58,7 @@ impl Default for SessionOptions {
             start: Root::default(),
             cache: KvDtype::F16,
             anchoring: Anchoring::Bundle,
+            stance: true,
             audio: AudioBackend::default(),
         }
     }
