@@ -116,7 +116,7 @@ pub fn recording(seconds: f32) -> Recording {
         let bearing = wrap(head.x.atan2(head.z) - yaw);
         // The body follows slowly and only when the neck no longer reaches; the head takes the rest.
         let aside = 0.35 * (t * 0.8).sin().max(0.0).powi(3) * (1.0 - 0.6 * speaking(t));
-        let step = (bearing.abs() - 0.45).max(0.0).min(0.5) * bearing.signum() * 0.09;
+        let step = (bearing.abs() - 0.45).clamp(0.0, 0.5) * bearing.signum() * 0.09;
         yaw = wrap(yaw + step);
         let look = (wrap(head.x.atan2(head.z) - yaw) + aside).clamp(-1.3, 1.3);
         let mut local = pose(t, look, 0.02);

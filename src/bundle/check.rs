@@ -27,7 +27,7 @@ pub(super) fn config(c: &Config) -> Result<()> {
     width("flow.width", w.width, w.heads)?;
     within("flow.mlp", w.mlp, 1, 16)?;
     within("flow.tau_width", w.tau_width, 2, 4096)?;
-    if w.tau_width % 2 != 0 {
+    if !w.tau_width.is_multiple_of(2) {
         return Err(invalid("flow.tau_width must be even: half cosines, half sines"));
     }
     within("flow.window_blocks", w.window_blocks, 2, 1024)?;
@@ -55,7 +55,7 @@ pub(super) fn config(c: &Config) -> Result<()> {
 fn width(name: &str, width: usize, heads: usize) -> Result<()> {
     within(name, width, 2, 8192)?;
     within(&name.replace("width", "heads"), heads, 1, 128)?;
-    if width % heads != 0 || (width / heads) % 2 != 0 {
+    if !width.is_multiple_of(2 * heads) {
         return Err(invalid(format!("{name} is {width}: it must be an even multiple of its {heads} heads")));
     }
     Ok(())

@@ -195,7 +195,7 @@ impl Session {
     /// [`ErrorKind::Argument`] when there are fewer tokens than the idle clip has.
     pub fn reset_with_noise(&mut self, noise: Vec<f32>) -> Result<()> {
         let latent = self.engine.config.vae.latent;
-        if noise.len() < self.engine.idle.len() || noise.len() % latent != 0 {
+        if noise.len() < self.engine.idle.len() || !noise.len().is_multiple_of(latent) {
             let message = format!("noise of {} values: whole tokens of {latent}, idle clip included", noise.len());
             return Err(Error::new(ErrorKind::Argument, message));
         }
