@@ -122,9 +122,10 @@ impl Exec {
 /// Values between two rows of scratch: rows a multiple of 4 KiB apart would compete for one set of the first-level cache.
 pub(super) const LINE: usize = 64;
 
-/// `x` itself when its few rows have the padded length, else a copy with zeros behind each row; and the distance of its rows.
+/// `x` itself when its rows have the padded length and are few and not too far apart, else a copy with zeros behind each row; and
+/// the distance of its rows.
 fn spread<'a>(x: &'a [f32], rows: usize, cols: usize, padded: usize, scratch: &'a mut Buffer) -> (&'a [f32], usize) {
-    if cols == padded && rows <= 4 {
+    if cols == padded && (rows == 1 || rows <= 4 && !cols.is_multiple_of(4096)) {
         return (x, cols);
     }
     let stride = padded + LINE / 4;

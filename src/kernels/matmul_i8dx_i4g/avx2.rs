@@ -1,11 +1,12 @@
 //! AVX2: `vpmaddubsw` of nibbles cannot saturate: the eight products of a lane's i16, each pair at most 2 * 15 * 127, add up to at
-//! most 30,480. So a whole group is summed in i16 and widened once.
+//! most 30,480. So a whole group is summed in i16 and widened once. Float sums stay in the tile, which leaves the registers to
+//! a group's accumulators.
 
 use std::arch::x86_64::*;
 
 use super::{GROUP, GROUP_BYTES, Job, NR, Tile};
 
-/// Bytes ahead that are asked for.
+/// Bytes ahead of each panel that are asked for.
 const AHEAD: usize = 1024;
 
 #[target_feature(enable = "avx2,fma,f16c")]
@@ -28,42 +29,50 @@ pub(super) fn run_with(
     widen: impl Fn(__m256i) -> __m256i + Copy,
 ) {
     job.check();
-    for p in 0..job.panels {
-        for r in (0..job.rows).step_by(4) {
-            match job.rows - r {
-                1 => block::<1>(job, (r, p), tile, dot, widen),
-                2 => block::<2>(job, (r, p), tile, dot, widen),
-                3 => block::<3>(job, (r, p), tile, dot, widen),
-                _ => block::<4>(job, (r, p), tile, dot, widen),
-            }
+    for r in (0..job.rows).step_by(8) {
+        match job.rows - r {
+            1 => rows::<1>(job, r, tile, dot, widen),
+            2 => rows::<2>(job, r, tile, dot, widen),
+            3 => rows::<3>(job, r, tile, dot, widen),
+            4 => rows::<4>(job, r, tile, dot, widen),
+            5 => rows::<5>(job, r, tile, dot, widen),
+            6 => rows::<6>(job, r, tile, dot, widen),
+            7 => rows::<7>(job, r, tile, dot, widen),
+            _ => rows::<8>(job, r, tile, dot, widen),
         }
     }
 }
 
-/// Rows from `from.0`, panel `from.1` of the job.
+/// Rows `row .. row + R` of the job.
 #[target_feature(enable = "avx2,fma,f16c")]
-fn block<const R: usize>(
+fn rows<const R: usize>(
     job: &Job<'_>,
-    from: (usize, usize),
+    row: usize,
     tile: &mut Tile<f32>,
     dot: impl Fn(__m256i, __m256i, __m256i) -> __m256i + Copy,
     widen: impl Fn(__m256i) -> __m256i + Copy,
 ) {
     let (groups, panel, stride) = (job.geo.groups, job.geo.panel, job.stride);
-    let start = (job.first + from.1) * panel;
-    let weights = job.weights[start..][..panel].as_ptr();
-    let scales = job.scales[(start + groups * GROUP_BYTES) / 2..][..groups * NR].as_ptr();
-    let q = job.q[from.0 * stride..][..R * stride].as_ptr();
-    let sums = &job.sums[from.0 * groups..][..R * groups];
+    let start = job.first * panel;
+    let weights = job.weights[start..][..job.panels * panel].as_ptr();
+    let scales = job.scales[start / 2..][..job.panels * panel / 2].as_ptr();
+    let q = job.q[row * stride..][..R * stride].as_ptr();
+    let sums = &job.sums[row * groups..][..R * groups];
     let low = _mm256_set1_epi8(15);
-    let mut total = [[_mm256_setzero_ps(); 2]; R];
+    let tile = &mut tile[row..row + R];
+    for row in &mut *tile {
+        row[..job.panels * NR].fill(0.0);
+    }
     for g in 0..groups {
-        for h in 0..2 {
+        let offset: [i32; R] = std::array::from_fn(|r| -8 * sums[r * groups + g]);
+        // Halves of panels: 8 lanes each.
+        for half in 0..2 * job.panels {
+            let (c, h) = (half / 2, half % 2);
             let mut acc = [_mm256_setzero_si256(); R];
             for j in 0..GROUP / 8 {
-                // SAFETY: half h of line j of group g, within the slice; a prefetch may point anywhere.
+                // SAFETY: half h of line j of group g of panel c, within the slice; a prefetch may point anywhere.
                 let w = unsafe {
-                    let line = weights.add(g * GROUP_BYTES + j * 64 + h * 32);
+                    let line = weights.add(c * panel + g * GROUP_BYTES + j * 64 + h * 32);
                     _mm_prefetch::<_MM_HINT_T0>(line.cast::<i8>().wrapping_add(AHEAD));
                     _mm256_loadu_si256(line.cast())
                 };
@@ -77,19 +86,16 @@ fn block<const R: usize>(
                     *acc = dot(dot(*acc, a, _mm256_set1_epi32(x)), b, _mm256_set1_epi32(y));
                 }
             }
-            // SAFETY: half of the 16 scales of group g.
-            let scale = _mm256_cvtph_ps(unsafe { _mm_loadu_si128(scales.add(g * NR + h * 8).cast()) });
-            for r in 0..R {
-                let sum = _mm256_add_epi32(widen(acc[r]), _mm256_set1_epi32(-8 * sums[r * groups + g]));
-                total[r][h] = _mm256_fmadd_ps(scale, _mm256_cvtepi32_ps(sum), total[r][h]);
+            // SAFETY: half of the 16 scales of group g behind the nibbles of panel c.
+            let scale = _mm256_cvtph_ps(unsafe {
+                _mm_loadu_si128(scales.add((c * panel + groups * GROUP_BYTES) / 2 + g * NR + h * 8).cast())
+            });
+            for (r, row) in tile.iter_mut().enumerate() {
+                let sum = _mm256_cvtepi32_ps(_mm256_add_epi32(widen(acc[r]), _mm256_set1_epi32(offset[r])));
+                let total = row[half * 8..][..8].as_mut_ptr();
+                // SAFETY: 8 values at `total`.
+                unsafe { _mm256_storeu_ps(total, _mm256_fmadd_ps(scale, sum, _mm256_loadu_ps(total))) };
             }
-        }
-    }
-    for (r, total) in total.iter().enumerate() {
-        let out = &mut tile[from.0 + r][from.1 * NR..][..NR];
-        for (h, total) in total.iter().enumerate() {
-            // SAFETY: 16 values at `out`.
-            unsafe { _mm256_storeu_ps(out.as_mut_ptr().add(8 * h), *total) };
         }
     }
 }
