@@ -128,7 +128,7 @@ def make_config(rig, audio_layers, audio_features, vae, flow, *, name, descripti
         "user_delay_blocks": 1, "agent_delay_blocks": 0, "rig": rig, "pose": {"radius": radius},
         "audio": {"layers": [dict(zip(("inputs", "outputs", "kernel", "stride", "residual"), s)) for s in audio_layers], "features": audio_features},
         "vae": vae, "flow": flow, "student": student,
-        "session": {"guidance": 1.3, "gaze_guidance": 2.5, "anchor_period": 0, "anchor_radius": 1000.0},
+        "session": {"guidance": 1.3, "gaze_guidance": 1.5, "anchor_period": 0, "anchor_radius": 1000.0},
     }
 
 

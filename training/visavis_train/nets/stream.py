@@ -21,6 +21,13 @@ def combine(x1, count, guidance, gaze_guidance):
     return out + gaze_guidance * (parts[2] - parts[1]) if count == 3 else out
 
 
+def history_time(tau, tau_history=None, clean_from=0.0):
+    """Flow time at which history enters an evaluation at `tau`: imputed (at `tau` itself) without `tau_history`; with it, imputed
+    below `clean_from` and at least `tau_history` from there. Early evaluations decide what happens and listen to the
+    conditions; late ones, over a clean past, join it without a jerk."""
+    return tau if tau_history is None or tau < clean_from else max(tau, tau_history)
+
+
 def midpoint(steps, eps, evaluate):
     """z at tau = 1 from eps; `evaluate(z, tau, slot)` gives the guided x1."""
     z, h = eps, 1.0 / steps
@@ -80,12 +87,12 @@ class Cache:
 class Stream:
     """Streams `batch` sequences at once. Time of network evaluations is proportional to the rows, not to the history."""
 
-    def __init__(self, net, batch, guidance=1.3, gaze_guidance=2.5, gaze=False, steps=4, tau_history=None, single=False):
-        """`single`: the network is a single-step student, one branch. `tau_history`: history enters at this flow time in every
-        evaluation (always so for a student); without it, at the flow time of the evaluation."""
+    def __init__(self, net, batch, guidance=1.3, gaze_guidance=2.5, gaze=False, steps=4, tau_history=None, clean_from=0.0, single=False):
+        """`single`: the network is a single-step student, one branch. `tau_history`, `clean_from`: see `history_time`."""
         if single and tau_history is None:
             raise ValueError("a single-step student needs tau_history")
-        self.net, self.batch, self.steps, self.tau_history, self.single = net, batch, steps, tau_history, single
+        self.net, self.batch, self.steps, self.single = net, batch, steps, single
+        self.past = lambda tau: history_time(tau, tau_history, clean_from)
         self.guidance, self.gaze_guidance, self.gaze = guidance, gaze_guidance, gaze
         self.count = 1 if single else (3 if gaze else 2)
         slots = 1 if single else 2 * steps
@@ -134,7 +141,7 @@ class Stream:
 
     def _commit(self, z, eps, cond):
         for slot, cache in enumerate(self.caches):
-            tau = self.tau_history if self.tau_history is not None else slot / (2 * self.steps)
+            tau = self.past(0.0 if self.single else slot / (2 * self.steps))
             done = (tau * z + (1 - tau) * eps).expand(self.batch, -1, -1).repeat(self.count, 1, 1)
             dummy = torch.cat([done, done], 1)
             c2 = torch.cat([cond, cond], 1)
@@ -150,7 +157,7 @@ class Stream:
             z = z.repeat(self.count, 1, 1)
             if before is None:
                 return self._pass(self.caches[slot], z, torch.full((1, 1), float(tau)), now)
-            history = tau if self.tau_history is None else self.tau_history
+            history = self.past(tau)
             done = (history * before[0] + (1 - history) * before[1]).repeat(self.count, 1, 1)
             taus = torch.tensor([[history, tau]], dtype=torch.float32)
             return self._pass(self.caches[slot], torch.cat([done, z], 1), taus, torch.cat([before[2], now], 1))

@@ -45,14 +45,15 @@ class Batch:
 
 
 @torch.no_grad()
-def roll(b, batch, target=None, student=False, steps=4, seed=0, guidance=None, gaze_guidance=None, tau_history=None):
-    """Generated feature vectors [B, T, F] in metres and roots [B, T, 3]. `target`: gaze score or None. `tau_history`: see Stream."""
+def roll(b, batch, target=None, student=False, steps=4, seed=0, guidance=None, gaze_guidance=None, tau_history=None, clean_from=0.0):
+    """Generated feature vectors [B, T, F] in metres and roots [B, T, 3]. `target`: gaze score or None. `tau_history`, `clean_from`: see `history_time`."""
     g = torch.Generator().manual_seed(seed)
     n, session = len(batch), b.config["session"]
     latent, width = b.config["vae"]["latent"], b.config["audio"]["features"]
     stream = Stream(b.student if student else b.flow, n, session["guidance"] if guidance is None else guidance,
                     session["gaze_guidance"] if gaze_guidance is None else gaze_guidance, target is not None, steps,
-                    b.config["student"]["tau_history"] if student else tau_history, student)
+                    b.config["student"]["tau_history"] if student else tau_history,
+                    clean_from, student)
     idle = b.encode(b.idle()[None]).expand(n, -1, -1)
     m = idle.shape[1]
     noise = lambda k: torch.randn(n, k, latent, generator=g)
@@ -145,7 +146,8 @@ def main():
     parser.add_argument("--steps", type=int, default=4)
     parser.add_argument("--guidance", type=float)
     parser.add_argument("--gaze-guidance", type=float)
-    parser.add_argument("--tau-history", type=float, help="history at this flow time in every evaluation instead of imputed at each")
+    parser.add_argument("--tau-history", type=float, help="history at this flow time in evaluations from --clean-from on")
+    parser.add_argument("--clean-from", type=float, default=0.0)
     parser.add_argument("--sheet")
     parser.add_argument("--threads", type=int, default=1)
     args = parser.parse_args()
@@ -163,7 +165,7 @@ def main():
     for text in args.gaze.split(","):
         target = None if text == "none" else float(text)
         x, roots = roll(b, batch, target, args.student, args.steps, guidance=args.guidance, gaze_guidance=args.gaze_guidance,
-                        tau_history=args.tau_history)
+                        tau_history=args.tau_history, clean_from=args.clean_from)
         show(f"gaze {text}", figures(b, x, roots, batch))
         rows.append((f"gaze {text}", world(x, roots), batch.user[0].numpy()))
     if args.sheet:

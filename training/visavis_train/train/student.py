@@ -2,7 +2,7 @@
 
     python -m visavis_train.train.student --cache runs/cache --vae runs/vae.pt --flow runs/flow.pt --out runs/student.pt --minutes 15
 
-The teacher is the reference sampler (midpoint 4, guidance and gaze guidance as at run time) started from the same noise; the student sees its
+The teacher is the multi-step sampler (midpoint 4, guided) started from the same noise, its late evaluations over a clean past; the student sees its
 history at `tau_history` and must give the teacher's block at once. Histories are real ones and the student's own closed-loop roll-outs, in which
 the user is seen from where the generated body stands. A teacher pass over a window makes a target of every block (`forward_pair`).
 """
@@ -13,7 +13,7 @@ import torch
 from torch import nn
 
 from ..nets.flow import GAZE, Condition, FlowNet
-from ..nets.stream import DecoderStream, Stream, branches, combine, midpoint
+from ..nets.stream import DecoderStream, Stream, branches, combine, history_time, midpoint
 from . import common
 from .cache import PHASES, load_vae
 from .flow import noisy, x1_error
@@ -26,15 +26,15 @@ def pick(c, rows):
 
 
 @torch.no_grad()
-def teach(net, history, eps, cond, gaze, guidance, gaze_guidance, steps=4):
-    """What the reference sampler makes of each block given its history: [B, T, Dz]."""
+def teach(net, history, eps, cond, gaze, guidance, gaze_guidance, steps=4, tau_history=None, clean_from=0.0):
+    """What the multi-step sampler makes of each block given its history: [B, T, Dz]. `tau_history`, `clean_from`: see `history_time`."""
     stacked, count = branches(cond, gaze), 3 if gaze else 2
 
     def evaluate(z, tau, slot):
-        t = torch.full((1, 1), tau)
-        past = noisy(history, t, eps)
+        past, now = torch.full((1, 1), history_time(tau, tau_history, clean_from)), torch.full((1, 1), tau)
+        rows = noisy(history, past, eps)
         with torch.autocast("cpu", torch.bfloat16):
-            x1 = net.forward_pair(past.repeat(count, 1, 1), t, z.repeat(count, 1, 1), t, stacked)
+            x1 = net.forward_pair(rows.repeat(count, 1, 1), past, z.repeat(count, 1, 1), now, stacked)
         return combine(x1, count, guidance, gaze_guidance)
 
     return midpoint(steps, eps, evaluate)
@@ -100,7 +100,9 @@ def main():
     parser.add_argument("--own", type=float, default=0.5, help="share of teacher passes over the student's own roll-outs")
     parser.add_argument("--tau-history", type=float, default=0.9)
     parser.add_argument("--guidance", type=float, default=1.3)
-    parser.add_argument("--gaze-guidance", type=float, default=2.5)
+    parser.add_argument("--gaze-guidance", type=float, default=1.5)
+    parser.add_argument("--clean-from", type=float, default=0.3,
+                        help="the teacher imputes history below this flow time and sees it at --tau-history from there; above 1: always imputed")
     parser.add_argument("--lr", type=float, default=4e-4)
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--resume", action="store_true")
@@ -137,7 +139,8 @@ def main():
         else:
             history, cond = windows.batch(args.teach)
             cond, eps = targets(cond, gaze), torch.randn_like(history)
-        wish = teach(teacher, history, eps, cond, gaze, args.guidance, args.gaze_guidance)
+        wish = teach(teacher, history, eps, cond, gaze, args.guidance, args.gaze_guidance,
+                     tau_history=args.tau_history, clean_from=args.clean_from)
         for row in range(args.teach):
             store.append((history[row], eps[row], wish[row], pick(cond, row), own))
         store = store[-800:]

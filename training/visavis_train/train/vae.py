@@ -11,6 +11,7 @@ import os
 import torch
 from torch import nn
 
+from ..motion.features import RADIUS
 from ..nets.vae import Vae
 from . import common
 from .data import Motions, statistics
@@ -80,7 +81,10 @@ def evaluate(net, x, mean, std):
     planted = va.norm(dim=-1) < 0.002
     acc = pb.diff(dim=1).diff(dim=1).norm(dim=-1).mean(-1)
     border = torch.arange(acc.shape[1]) % 4 >= 2
-    return {"joints_mm": error.mean().item(), "hands_mm": error[..., list(HANDS)].mean().item(), "feet_mm": error[..., feet].mean().item(),
+    axes = lambda f: (lambda v: v - v.mean(-2, keepdim=True))(f[..., ROOT:].unflatten(-1, (-1, 12, 3)))
+    # vertices turned by a small angle t move by |R - R'| = sqrt(2) t over all axes, and sum_v |X_v|^2 = 4 r^2 |R|^2
+    turn = (axes(a) - axes(b)).square().sum((-1, -2)).sqrt() / (2 * RADIUS) / 2 ** 0.5 * 57.3
+    return {"rotation_deg": turn.mean().item(), "joints_mm": error.mean().item(), "hands_mm": error[..., list(HANDS)].mean().item(), "feet_mm": error[..., feet].mean().item(),
             "root_step_mm": ((a - b)[..., :2].norm(dim=-1) * 1000).mean().item(), "root_1s_mm": drift[:, 29].mean().item(),
             "root_end_mm": drift[:, -1].mean().item(), "yaw_end_deg": (ra - rb)[:, -1, 2].abs().mean().item() * 57.3,
             "slide_mm": (vb.norm(dim=-1)[planted].mean() * 1000).item(), "seam": (acc[:, border].mean() / acc[:, ~border].mean()).item()}
@@ -103,10 +107,18 @@ def main():
                         help="with --init: go on with the decoder alone, so that latents (and a flow trained on them) stay valid; latents get noise")
     parser.add_argument("--errors", nargs=2, metavar=("FLOW", "CACHE"),
                         help="with --decoder-only: the noise is like the errors of this flow, so that the decoder does not turn them into jitter")
+    parser.add_argument("--smooth", type=float, default=1.0, help="factor on the loss of velocities and accelerations")
+    parser.add_argument("--evaluate", metavar="SPLIT", help="only print how well --out reconstructs that split")
     parser.add_argument("--resume", action="store_true")
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
     torch.manual_seed(0)
+    if args.evaluate:
+        state = torch.load(args.out, weights_only=False)
+        net = Vae(len(state["mean"]), **state["size"])
+        net.load_state_dict(state["ema"])
+        x = (Motions(args.corpus, args.evaluate, args.limit).sample(48, 4 * args.blocks) - state["mean"]) / state["std"]
+        return print({k: round(v, 2) for k, v in evaluate(net.eval(), x, state["mean"], state["std"]).items()})
     train, held = Motions(args.corpus, "train", args.limit), Motions(args.corpus, "val", args.limit)
     if not train.items:
         raise SystemExit(f"no clips under {args.corpus}/train: build the corpus first (python -m visavis_train.corpus)")
@@ -152,12 +164,13 @@ def main():
             if args.decoder_only:
                 with torch.no_grad():
                     mu, logvar = (t.float() for t in net.encoder(x))
-                noise = (torch.randn_like(mu) @ noise_map.T) * torch.rand(len(mu), 1, 1)
+                noise = (torch.randn_like(mu) @ noise_map.T) * (1.2 * torch.rand(len(mu), 1, 1))
                 y = net.decoder(mu + noise).float()
             else:
                 y, mu, logvar = net(x)
         parts = losses(x, y, mean, std, mu, logvar, weights, jw)
-        loss = sum(v for k, v in parts.items() if k != "kl") + args.kl * parts["kl"]
+        scale = {"kl": args.kl, "velocity": args.smooth, "acceleration": args.smooth}
+        loss = sum(scale.get(k, 1.0) * v for k, v in parts.items())
         common.set_rate(optim, common.rate(args.lr, step, clock.progress))
         optim.zero_grad()
         loss.backward()
