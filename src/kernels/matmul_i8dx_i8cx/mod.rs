@@ -73,6 +73,7 @@ impl Geometry {
 /// their groups of 32 at `sums`; `panels` in 1..=4 panels from `first`.
 pub(crate) struct Job<'a> {
     pub(crate) q: &'a [i8],
+    #[allow(dead_code, reason = "the AVX2 variant alone reads it")]
     pub(crate) wide: &'a [i16],
     pub(crate) sums: &'a [i32],
     /// From one row of q to the next.
