@@ -48,15 +48,16 @@ def load_net(prefix, net, tensors):
     return net.eval()
 
 
-def write(path, tensors, config, half=False):
-    """Writes beside `path` and renames, so that a reader never sees half a file."""
+def write(path, tensors, config, half=False, narrow=()):
+    """Writes beside `path` and renames, so that a reader never sees half a file. `narrow`: prefixes written as f16 in any case."""
     dtype = torch.float16 if half else torch.float32
-    tensors = {k: v.detach().to(dtype).contiguous().clone() for k, v in tensors.items()}
+    tensors = {k: v.detach().to(torch.float16 if k.startswith(narrow) else dtype).contiguous().clone() for k, v in tensors.items()}
     bad = [k for k, v in tensors.items() if not torch.isfinite(v).all()]
     if bad:
         raise ValueError(f"not finite: {', '.join(bad)}")
     temporary = f"{path}.tmp"
     save_file(tensors, temporary, metadata={KEY: json.dumps(config)})
+    os.chmod(temporary, 0o644)
     os.replace(temporary, path)
 
 
@@ -128,7 +129,8 @@ def make_config(rig, audio_layers, audio_features, vae, flow, *, name, descripti
         "user_delay_blocks": 1, "agent_delay_blocks": 0, "rig": rig, "pose": {"radius": radius},
         "audio": {"layers": [dict(zip(("inputs", "outputs", "kernel", "stride", "residual"), s)) for s in audio_layers], "features": audio_features},
         "vae": vae, "flow": flow, "student": student,
-        "session": {"guidance": 1.3, "gaze_guidance": 1.5, "anchor_period": 0, "anchor_radius": 1000.0},
+        "session": {"guidance": 1.3, "gaze_guidance": 1.5, "temperature": 0.75, "anchor_period": 0,
+                    "anchor_radius": 1000.0},
     }
 
 

@@ -6,6 +6,7 @@ Averaged (EMA) weights are written. The idle clip, from which sessions start, is
 low and slow, facing the user; turned so that it ends facing +Z (features are relative, so nothing needs turning).
 """
 import argparse
+import os
 
 import numpy as np
 import torch
@@ -86,6 +87,7 @@ def main():
     parser.add_argument("--idle-frames", type=int, default=64)
     parser.add_argument("--idle-from", help="take the idle clip of this bundle")
     parser.add_argument("--half", action="store_true", help="fp16 weights")
+    parser.add_argument("--half-student", action="store_true", help="fp16 weights for the student only")
     args = parser.parse_args()
     if args.idle_frames % 4:
         raise SystemExit("--idle-frames must be a multiple of 4")
@@ -97,8 +99,8 @@ def main():
             raise SystemExit(f"no conversation clips under {args.corpus}/train")
         print(f"idle clip from {where}")
     tensors, config = assemble(load_audio(args.audio), args.vae, args.flow, args.student, idle, args.name)
-    bundle.write(args.out, tensors, config, half=args.half)
-    print(f"{args.out}: {sum(t.numel() for t in tensors.values()) * (2 if args.half else 4) / 1e6:.1f} MB")
+    bundle.write(args.out, tensors, config, half=args.half, narrow=("student.",) if args.half_student else ())
+    print(f"{args.out}: {os.path.getsize(args.out) / 1e6:.1f} MB")
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ take token indices 0 .. M-1; block k of the session is token M + k. The agent st
 frame. Block 0 has no block before it, so its user position and voice are absent (flag 0); idle tokens have every modality absent.
 Contents (K blocks, T = 4 K frames):
     agent_voice, user_voice  [N] i16, 24 kHz, value / 32768; silence after the end
-    user_path [T, 3] world;  gaze [1] target;  eps [K, Dz], eps_idle [M, Dz]
+    user_path [T, 3] world;  gaze [1] target;  eps [K, Dz], eps_idle [M, Dz], as they enter (no temperature)
     idle.mu [M, Dz] encoder mean of the idle clip, idle.latents [M, Dz] standardised
     agent_features, user_features [T, D_a]
     conditioning.user [K, 8] metres, conditioning.flags [K, 4] of branch F (user, agent voice, user voice, gaze)

@@ -66,6 +66,7 @@ def build(seed=1):
         bundle.rig_config(rig.NAMES, rig.PARENTS, rig.OFFSETS, rig.EYES, rig.HEAD_BACK), AUDIO, 8, VAE, FLOW, name="tiny",
         description="Random weights for tests; its motion means nothing.", licence="Same as the code.",
         student={"tau_history": 0.9375, "guidance": 1.3, "gaze_guidance": 2.5})
+    config["session"] = {"guidance": 1.3, "gaze_guidance": 2.5, "anchor_period": 0, "anchor_radius": 1000.0}
     return tensors, config
 
 

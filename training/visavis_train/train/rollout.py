@@ -45,8 +45,9 @@ class Batch:
 
 
 @torch.no_grad()
-def roll(b, batch, target=None, student=False, steps=4, seed=0, guidance=None, gaze_guidance=None, tau_history=None, clean_from=0.0):
-    """Generated feature vectors [B, T, F] in metres and roots [B, T, 3]. `target`: gaze score or None. `tau_history`, `clean_from`: see `history_time`."""
+def roll(b, batch, target=None, student=False, steps=4, seed=0, guidance=None, gaze_guidance=None, tau_history=None, clean_from=0.0, temperature=None):
+    """Generated feature vectors [B, T, F] in metres and roots [B, T, 3]. `target`: gaze score or None. `tau_history`, `clean_from`: see `history_time`.
+    `temperature` scales the noise that blocks start from; the bundle's by default."""
     g = torch.Generator().manual_seed(seed)
     n, session = len(batch), b.config["session"]
     latent, width = b.config["vae"]["latent"], b.config["audio"]["features"]
@@ -54,6 +55,7 @@ def roll(b, batch, target=None, student=False, steps=4, seed=0, guidance=None, g
                     session["gaze_guidance"] if gaze_guidance is None else gaze_guidance, target is not None, steps,
                     b.config["student"]["tau_history"] if student else tau_history,
                     clean_from, student)
+    heat = session.get("temperature", 1.0) if temperature is None else temperature
     idle = b.encode(b.idle()[None]).expand(n, -1, -1)
     m = idle.shape[1]
     noise = lambda k: torch.randn(n, k, latent, generator=g)
@@ -70,7 +72,7 @@ def roll(b, batch, target=None, student=False, steps=4, seed=0, guidance=None, g
         flags = torch.tensor([[known, 1.0, known, 1.0]]).repeat(n, 1)
         flags[:, 1:3] *= batch.has
         cond = Condition(user, batch.agent[:, now].reshape(n, 1, -1), voice, torch.full((n, 1, 4), float(target or 0)), flags[:, None])
-        x = b.unstandardise(decoder.step(place(stream.step(noise(1), cond))))
+        x = b.unstandardise(decoder.step(place(stream.step(heat * noise(1), cond))))
         path = integrate(x[..., :3].double(), root)
         root = path[:, -1]
         out.append(x)
@@ -148,6 +150,7 @@ def main():
     parser.add_argument("--gaze-guidance", type=float)
     parser.add_argument("--tau-history", type=float, help="history at this flow time in evaluations from --clean-from on")
     parser.add_argument("--clean-from", type=float, default=0.0)
+    parser.add_argument("--temperature", type=float, help="scale of the noise; default the bundle's")
     parser.add_argument("--sheet")
     parser.add_argument("--threads", type=int, default=1)
     args = parser.parse_args()
@@ -165,7 +168,7 @@ def main():
     for text in args.gaze.split(","):
         target = None if text == "none" else float(text)
         x, roots = roll(b, batch, target, args.student, args.steps, guidance=args.guidance, gaze_guidance=args.gaze_guidance,
-                        tau_history=args.tau_history, clean_from=args.clean_from)
+                        tau_history=args.tau_history, clean_from=args.clean_from, temperature=args.temperature)
         show(f"gaze {text}", figures(b, x, roots, batch))
         rows.append((f"gaze {text}", world(x, roots), batch.user[0].numpy()))
     if args.sheet:

@@ -47,7 +47,7 @@ class Rollouts:
         self.windows, self.decoder, self.mean, self.std, self.warm = windows, vae.decoder, mean, std, warm
 
     @torch.no_grad()
-    def make(self, net, size, gaze, tau_history):
+    def make(self, net, size, gaze, tau_history, temperature=1.0):
         """Latents, noise and conditions of `size` windows."""
         w, n, warm = self.windows, self.windows.blocks, self.warm
         picks, cuts, worlds, starts = torch.multinomial(w.weights, size, replacement=True).tolist(), [], [], []
@@ -61,7 +61,7 @@ class Rollouts:
         z, user, agent, voice, g, flags = (torch.stack(c) for c in zip(*cuts))
         cond = Condition(user.flatten(2), agent, voice, g, flags[:, None].repeat(1, n, 1))
         cond = targets(cond, gaze)
-        eps, root, worlds = torch.randn_like(z), torch.stack(starts), torch.stack(worlds)
+        eps, root, worlds = temperature * torch.randn_like(z), torch.stack(starts), torch.stack(worlds)
         stream = Stream(net, size, gaze=gaze, tau_history=tau_history, single=True)
         at = lambda c, k: c.map(lambda t: t[:, k:k + 1])
         stream.warm(z[:, :warm], eps[:, :warm], cond.map(lambda t: t[:, :warm]))
@@ -99,10 +99,11 @@ def main():
     parser.add_argument("--reuse", type=int, default=4, help="student updates for each teacher pass")
     parser.add_argument("--own", type=float, default=0.5, help="share of teacher passes over the student's own roll-outs")
     parser.add_argument("--tau-history", type=float, default=0.9)
-    parser.add_argument("--guidance", type=float, default=1.3)
+    parser.add_argument("--guidance", type=float, default=2.0)
     parser.add_argument("--gaze-guidance", type=float, default=1.5)
     parser.add_argument("--clean-from", type=float, default=0.3,
                         help="the teacher imputes history below this flow time and sees it at --tau-history from there; above 1: always imputed")
+    parser.add_argument("--temperature", type=float, default=0.75, help="scale of the noise, as sessions use it")
     parser.add_argument("--lr", type=float, default=4e-4)
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--resume", action="store_true")
@@ -135,10 +136,10 @@ def main():
         gaze = bool(torch.rand(1) < 0.6)
         own = bool(torch.rand(1) < args.own * min(1.0, step / 200))
         if own:
-            history, eps, cond = rollouts.make(ema.net, args.teach, gaze, args.tau_history)
+            history, eps, cond = rollouts.make(ema.net, args.teach, gaze, args.tau_history, args.temperature)
         else:
             history, cond = windows.batch(args.teach)
-            cond, eps = targets(cond, gaze), torch.randn_like(history)
+            cond, eps = targets(cond, gaze), args.temperature * torch.randn_like(history)
         wish = teach(teacher, history, eps, cond, gaze, args.guidance, args.gaze_guidance,
                      tau_history=args.tau_history, clean_from=args.clean_from)
         for row in range(args.teach):
