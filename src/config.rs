@@ -132,8 +132,15 @@ pub struct SessionConfig {
     pub guidance: f32,
     /// Gaze guidance weight.
     pub gaze_guidance: f32,
+    /// Scale of the noise that blocks start from; 1 samples what was trained, less gives calmer motion.
+    #[serde(default = "unscaled")]
+    pub temperature: f32,
     /// Blocks between re-anchorings; 0 never.
     pub anchor_period: u32,
     /// Distance from the anchor at which the session re-anchors early, metres.
     pub anchor_radius: f32,
+}
+
+fn unscaled() -> f32 {
+    1.0
 }

@@ -247,3 +247,16 @@ fn absent_is_not_silent() {
     let absent = motion(options(), &inputs, 8);
     assert_ne!(silent[0].global, absent[0].global);
 }
+
+/// Temperature scales the seeded noise: at 0 nothing is left of the seed, at 1 it is the noise that was trained with.
+#[test]
+fn temperature_scales_the_noise() {
+    let inputs = inputs();
+    let run =
+        |seed, temperature| motion(SessionOptions { seed, temperature: Some(temperature), ..options() }, &inputs, 6);
+    assert_eq!(run(1, 0.0), run(2, 0.0));
+    assert_ne!(run(1, 0.5)[0].global, run(2, 0.5)[0].global);
+    assert_ne!(run(1, 0.5)[0].global, run(1, 1.0)[0].global);
+    let refused = tiny().session(SessionOptions { temperature: Some(-0.1), ..options() });
+    assert_eq!(refused.unwrap_err().kind(), ErrorKind::Argument);
+}

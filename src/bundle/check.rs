@@ -48,6 +48,7 @@ pub(super) fn config(c: &Config) -> Result<()> {
     }
     real("session.guidance", c.session.guidance, 0.0, 20.0)?;
     real("session.gaze_guidance", c.session.gaze_guidance, 0.0, 20.0)?;
+    real("session.temperature", c.session.temperature, 0.0, 2.0)?;
     within("session.anchor_period", c.session.anchor_period as usize, 0, 1 << 20)?;
     real("session.anchor_radius", c.session.anchor_radius, 0.1, 1e6)
 }

@@ -77,11 +77,12 @@ impl BlockState {
         self.decoder.reset();
         self.anchor.reset(options.start);
         self.motion.reset(options.start);
+        let temperature = options.temperature(engine);
         let absent = &self.inputs.condition;
         self.exec.begin();
         for z in engine.idle.chunks_exact(engine.config.vae.latent) {
             let noise = &self.noise;
-            self.generator.append(absent, z, |token, eps| noise.fill(options.seed, token, eps));
+            self.generator.append(absent, z, |token, eps| noise.fill(options.seed, temperature, token, eps));
             self.latent.copy_from_slice(z);
             engine.latent.restore(&mut self.latent);
             engine.decoder.step(&mut self.exec, &mut self.decoder, &self.latent, &mut self.features);
@@ -120,7 +121,7 @@ impl BlockState {
         let (block, root) = (self.block, self.motion.root());
         self.inputs.prepare(&mut self.exec, engine, block, &root, options.gaze, &mut probe)?;
 
-        let (student, noise) = (engine.student.as_ref(), &self.noise);
+        let (student, noise, temperature) = (engine.student.as_ref(), &self.noise, options.temperature(engine));
         let mut tap = probe.as_mut().map(|p| |_: usize, x1: &[f32]| p.stage(block, "x1", x1));
         let z = self.generator.sample(
             &mut self.exec,
@@ -129,7 +130,7 @@ impl BlockState {
             options.sampler,
             options.guidance(engine),
             &self.inputs.condition,
-            |token, eps| noise.fill(options.seed, token, eps),
+            |token, eps| noise.fill(options.seed, temperature, token, eps),
             tap.as_mut().map(|tap| tap as _),
         );
         self.latent.copy_from_slice(z);
@@ -165,14 +166,15 @@ impl BlockState {
 }
 
 impl Noise {
-    fn fill(&self, seed: u64, token: u64, eps: &mut [f32]) {
-        match self {
-            Noise::Given(values) => match values.chunks_exact(eps.len()).nth(token as usize) {
-                Some(given) => eps.copy_from_slice(given),
-                None => normal(seed, token, eps),
-            },
-            Noise::Seeded => normal(seed, token, eps),
+    /// Seeded noise is scaled by `temperature`; given noise enters as it is.
+    fn fill(&self, seed: u64, temperature: f32, token: u64, eps: &mut [f32]) {
+        if let Noise::Given(values) = self
+            && let Some(given) = values.chunks_exact(eps.len()).nth(token as usize)
+        {
+            return eps.copy_from_slice(given);
         }
+        normal(seed, token, eps);
+        eps.iter_mut().for_each(|e| *e *= temperature);
     }
 }
 

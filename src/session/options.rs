@@ -34,6 +34,8 @@ pub struct SessionOptions {
     pub guidance: Option<f32>,
     /// Gaze guidance weight, 0 to 20; `None` for the bundle's.
     pub gaze_guidance: Option<f32>,
+    /// Scale of the noise that blocks start from, 0 to 2; `None` for the bundle's. Less gives calmer motion.
+    pub temperature: Option<f32>,
     /// Where the agent stands at the start, in the caller's world.
     pub start: Root,
     /// Storage of the key-value caches; f16 but for checks of the maths.
@@ -55,6 +57,7 @@ impl Default for SessionOptions {
             gaze: None,
             guidance: None,
             gaze_guidance: None,
+            temperature: None,
             start: Root::default(),
             cache: KvDtype::F16,
             anchoring: Anchoring::Bundle,
@@ -68,6 +71,9 @@ impl SessionOptions {
     pub(super) fn check(&self, engine: &Engine) -> Result<()> {
         check_gaze(self.gaze)?;
         [self.guidance, self.gaze_guidance].into_iter().flatten().try_for_each(check_guidance)?;
+        if let Some(t) = self.temperature.filter(|t| !(0.0..=2.0).contains(t)) {
+            return Err(argument(format!("temperature {t}: 0 to 2")));
+        }
         if !matches!(self.threads, 1 | 2) {
             return Err(argument(format!("threads is {}: 1 or 2", self.threads)));
         }
@@ -82,6 +88,10 @@ impl SessionOptions {
             Sampler::Single if engine.student.is_some() => Ok(()),
             other => Err(unsupported(other, engine)),
         }
+    }
+
+    pub(super) fn temperature(&self, engine: &Engine) -> f32 {
+        self.temperature.unwrap_or(engine.config.session.temperature)
     }
 
     pub(super) fn guidance(&self, engine: &Engine) -> Guidance {

@@ -129,8 +129,8 @@ def make_config(rig, audio_layers, audio_features, vae, flow, *, name, descripti
         "user_delay_blocks": 1, "agent_delay_blocks": 0, "rig": rig, "pose": {"radius": radius},
         "audio": {"layers": [dict(zip(("inputs", "outputs", "kernel", "stride", "residual"), s)) for s in audio_layers], "features": audio_features},
         "vae": vae, "flow": flow, "student": student,
-        "session": {"guidance": 1.3, "gaze_guidance": 1.5, "temperature": 0.75, "anchor_period": 0,
-                    "anchor_radius": 1000.0},
+        "session": {"guidance": 1.3, "gaze_guidance": 1.5, "temperature": 0.75, "anchor_period": 90,
+                    "anchor_radius": 8.0},
     }
 
 
