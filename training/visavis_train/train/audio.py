@@ -4,7 +4,6 @@
 
 The targets of frame t come from the window of 1600 samples that ends with it: log-mel bands (of it and the frame before),
 log energy, onset strength, voicing and log f0 from the autocorrelation. The head that predicts them is thrown away.
-To distil from other features (HuBERT, say), give `--targets DIR` of .npy files [T, D] at 30 fps named like the wav files.
 """
 import argparse
 import glob
