@@ -218,3 +218,31 @@ impl Standard {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use safetensors::SafeTensors;
+
+    fn golden(name: &str) -> Vec<f32> {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/goldens/tiny-golden.safetensors");
+        let bytes = std::fs::read(path).unwrap();
+        let file = SafeTensors::deserialize(&bytes).unwrap();
+        let (numbers, _) = file.tensor(name).unwrap().data().as_chunks::<4>();
+        numbers.iter().map(|b| f32::from_le_bytes(*b)).collect()
+    }
+
+    /// The encoder alone: what `tests/parity.rs` sees of it only through the history.
+    #[test]
+    fn encoder_equals_pytorch() {
+        let engine = Engine::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/goldens/tiny.safetensors")).unwrap();
+        let mut expected = golden("encoder.mu");
+        expected.chunks_exact_mut(engine.config.vae.latent).for_each(|mu| engine.latent.standardise_in_place(mu));
+        let latents = engine.encode(&golden("encoder.frames")).unwrap();
+        assert_eq!(latents.len(), expected.len());
+        let error = latents.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(error < 1e-4, "{error}");
+        let idle = engine.idle.iter().zip(golden("idle.latents")).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(idle < 1e-4, "{idle}");
+    }
+}
