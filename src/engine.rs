@@ -5,8 +5,9 @@ use crate::bundle::{AudioSource, BundleFile, Tensors};
 use crate::config::Config;
 use crate::error::{Error, ErrorKind, Result};
 use crate::flow::{ConditionLayout, FlowNet};
-use crate::frame::{BLOCK_FRAMES, JOINT_CHANNELS, ROOT_CHANNELS};
+use crate::frame::BLOCK_FRAMES;
 use crate::kernels::{Exec, Kernels, KvDtype, Limits};
+use crate::pose::feature_count;
 use crate::session::{Session, SessionOptions};
 use crate::vae::{Decoder, Encoder};
 use std::path::Path;
@@ -82,7 +83,7 @@ impl Engine {
     }
 
     fn build(config: Config, t: &Tensors<'_>, kernels: Kernels) -> Result<Self> {
-        let features = feature_width(&config);
+        let features = feature_count(config.rig.joints.len());
         let latent = config.vae.latent;
         let layout = ConditionLayout { audio_features: config.audio.features };
         let (idle_frames, idle) = t.f32_rows("idle.frames", features)?;
@@ -177,11 +178,6 @@ impl Engine {
         let width = flow.into_iter().chain(rest).fold(audio, usize::max);
         Exec::new(self.kernels, threads, Limits { rows: rows.max(32), width })
     }
-}
-
-/// Channels of a frame: the root's, then an icosahedron a joint.
-fn feature_width(config: &Config) -> usize {
-    ROOT_CHANNELS + JOINT_CHANNELS * config.rig.joints.len()
 }
 
 impl Standard {
