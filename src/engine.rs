@@ -147,11 +147,6 @@ impl Engine {
         self.kernels
     }
 
-    /// Bytes of packed weights that one evaluation of the flow network reads.
-    pub fn bytes_per_pass(&self) -> usize {
-        self.flow.bytes_per_pass()
-    }
-
     /// Blocks of the idle clip, which are the first tokens of every session.
     pub fn idle_blocks(&self) -> usize {
         self.idle.len() / self.latent.mean.len()

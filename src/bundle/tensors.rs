@@ -36,11 +36,6 @@ impl<'a> Tensors<'a> {
         infos
     }
 
-    /// Whether any tensor's name starts with `prefix`.
-    pub fn has(&self, prefix: &str) -> bool {
-        self.container.names().iter().any(|name| name.starts_with(prefix))
-    }
-
     /// Reads a vector or matrix of the given shape, f32 or f16 in the file, as f32.
     ///
     /// # Errors

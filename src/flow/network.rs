@@ -121,12 +121,6 @@ impl FlowNet {
         self.latent
     }
 
-    /// Bytes of the weights that every network evaluation reads.
-    pub fn bytes_per_pass(&self) -> usize {
-        let layer = |l: &Layer| l.qkv.bytes() + l.proj.bytes() + l.fc1.bytes() + l.fc2.bytes();
-        self.layers.iter().map(layer).sum::<usize>() + self.input_latent.bytes() + self.out.bytes()
-    }
-
     /// Width of the embedded conditioning that [`FlowNet::project`] needs as scratch.
     pub(super) fn rest_width(&self) -> usize {
         self.input_rest.in_features()
