@@ -135,10 +135,31 @@ pub struct SessionConfig {
     /// Scale of the noise that blocks start from; 1 samples what was trained, less gives calmer motion.
     #[serde(default = "unscaled")]
     pub temperature: f32,
+    /// Late evaluations see history nearly clean; absent: history is imputed at each evaluation's own flow time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clean_history: Option<CleanHistory>,
     /// Blocks between re-anchorings; 0 never.
     pub anchor_period: u32,
     /// Distance from the anchor at which the session re-anchors early, metres.
     pub anchor_radius: f32,
+}
+
+/// Flow time at which history enters an evaluation at flow time `t`: `t` itself below `from`, `max(t, tau)` from there.
+///
+/// Early evaluations decide what happens and listen to the conditions; late ones, over a clean past, join it smoothly.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct CleanHistory {
+    /// Least flow time of history in late evaluations, 0 to 1.
+    pub tau: f32,
+    /// Flow time of the first late evaluation, 0 to 1.
+    pub from: f32,
+}
+
+impl CleanHistory {
+    /// Flow time of history for an evaluation at `t`.
+    pub fn time(&self, t: f32) -> f32 {
+        if t < self.from { t } else { t.max(self.tau) }
+    }
 }
 
 fn unscaled() -> f32 {

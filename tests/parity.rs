@@ -7,9 +7,10 @@ mod common;
 
 use common::{Golden, max_error, tiny};
 use std::collections::BTreeMap;
+use visavis::config::CleanHistory;
 use visavis::frame::{FPS, Sampler};
 use visavis::kernels::KvDtype;
-use visavis::session::{Anchoring, Probe, SessionOptions};
+use visavis::session::{Anchoring, HistoryTime, Probe, SessionOptions};
 
 const TOLERANCE: f32 = 1e-4;
 
@@ -25,10 +26,13 @@ impl Probe for Stages {
 
 /// Runs the golden file's inputs and noise through a session.
 fn stages(golden: &Golden, sampler: Sampler, cache: KvDtype) -> BTreeMap<&'static str, Vec<f32>> {
+    stages_with(golden, SessionOptions { sampler, cache, ..Default::default() })
+}
+
+fn stages_with(golden: &Golden, options: SessionOptions) -> BTreeMap<&'static str, Vec<f32>> {
     let engine = tiny();
     let gaze = Some(golden.values("gaze")[0]);
-    let options =
-        SessionOptions { sampler, gaze, cache, anchoring: Anchoring::Never, stance: false, ..Default::default() };
+    let options = SessionOptions { gaze, anchoring: Anchoring::Never, stance: false, ..options };
     let mut session = engine.session(options).expect("session");
     let mut noise = golden.values("eps_idle");
     noise.extend(golden.values("eps"));
@@ -95,6 +99,19 @@ fn cheaper_samplers_equal_pytorch() {
         println!("{sampler}: {error:e}");
         assert!(error < TOLERANCE, "{sampler} differs by {error}");
     }
+}
+
+/// History at 0.9 or later in evaluations from 0.3 on, at the evaluations' own flow times before.
+#[test]
+fn clean_history_equals_pytorch() {
+    let golden = Golden::load();
+    let history = HistoryTime::Clean(CleanHistory { tau: 0.9, from: 0.3 });
+    let options = SessionOptions { cache: KvDtype::F32, history, ..Default::default() };
+    let ours = stages_with(&golden, options);
+    let error = max_error(&ours["latents"], &golden.values("latents.clean"));
+    println!("clean history: {error:e}");
+    assert!(error < TOLERANCE, "latents differ by {error}");
+    assert!(max_error(&golden.values("latents.clean"), &golden.values("latents")) > 0.01, "it is another sampler");
 }
 
 /// fp16 rounds keys and values to 11 bits (relative 5e-4); over 20 free-running blocks with random weights that stays

@@ -49,6 +49,10 @@ pub(super) fn config(c: &Config) -> Result<()> {
     real("session.guidance", c.session.guidance, 0.0, 20.0)?;
     real("session.gaze_guidance", c.session.gaze_guidance, 0.0, 20.0)?;
     real("session.temperature", c.session.temperature, 0.0, 2.0)?;
+    if let Some(h) = &c.session.clean_history {
+        real("session.clean_history.tau", h.tau, 0.0, 1.0)?;
+        real("session.clean_history.from", h.from, 0.0, 1.0)?;
+    }
     within("session.anchor_period", c.session.anchor_period as usize, 0, 1 << 20)?;
     real("session.anchor_radius", c.session.anchor_radius, 0.1, 1e6)
 }

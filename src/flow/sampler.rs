@@ -4,6 +4,7 @@ use super::condition::Condition;
 use super::history::History;
 use super::network::FlowNet;
 use super::slots::{Branches, CHUNK, GAZE, NO_GAZE, Slots, UNCONDITIONAL};
+use crate::config::CleanHistory;
 use crate::frame::Sampler;
 use crate::kernels::{Exec, KvDtype};
 
@@ -23,6 +24,8 @@ pub struct GeneratorOptions {
     pub sampler: Sampler,
     /// Storage of the caches.
     pub dtype: KvDtype,
+    /// Whether late evaluations of the reference network see history nearly clean; `None` imputes it throughout.
+    pub clean_history: Option<CleanHistory>,
 }
 
 /// Receives each network evaluation: number of the evaluation, and x1 of each branch, `[branches, latent]`.
@@ -63,7 +66,7 @@ impl Generator {
         if let Sampler::Euler(steps) = options.sampler {
             taus.extend((0..steps).map(|i| f32::from(i) / f32::from(steps)).filter(|t| !eighths().contains(t)));
         }
-        let pairs: Vec<_> = taus.iter().map(|t| (*t, *t)).collect();
+        let pairs: Vec<_> = taus.iter().map(|t| (options.clean_history.map_or(*t, |c| c.time(*t)), *t)).collect();
         let (latent, window) = (net.latent(), net.config().window_blocks);
         let dtype = options.dtype;
         Self {

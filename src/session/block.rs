@@ -44,7 +44,11 @@ impl BlockState {
     pub(super) fn new(engine: &Engine, options: &SessionOptions) -> Result<Self> {
         let mut exec = engine.exec(options.threads)?;
         let student = engine.student.as_ref().zip(engine.config.student.map(|s| s.tau_history));
-        let generator_options = GeneratorOptions { sampler: options.sampler, dtype: options.cache };
+        let generator_options = GeneratorOptions {
+            sampler: options.sampler,
+            dtype: options.cache,
+            clean_history: options.clean_history(engine),
+        };
         let condition = Condition::absent(engine.layout());
         exec.begin();
         let generator = Generator::new(&mut exec, &engine.flow, student, &condition, generator_options);

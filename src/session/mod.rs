@@ -23,7 +23,7 @@ mod options;
 mod probe;
 mod stats;
 
-pub use options::{Anchoring, SessionOptions};
+pub use options::{Anchoring, HistoryTime, SessionOptions};
 pub use probe::Probe;
 pub use stats::{Delays, InputStats, SessionStats};
 

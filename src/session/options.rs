@@ -1,6 +1,7 @@
 //! What a session is made with.
 
 use crate::audio::AudioBackend;
+use crate::config::CleanHistory;
 use crate::engine::Engine;
 use crate::error::{Error, ErrorKind, Result};
 use crate::flow::Guidance;
@@ -17,6 +18,18 @@ pub enum Anchoring {
     Never,
     /// Every this many blocks (at least 1).
     Every(u32),
+}
+
+/// Flow time at which finished blocks enter the reference network (the single-step student brings its own).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum HistoryTime {
+    /// As the bundle says.
+    #[default]
+    Bundle,
+    /// At each evaluation's own flow time.
+    Imputed,
+    /// Nearly clean in late evaluations.
+    Clean(CleanHistory),
 }
 
 /// Options of a session. Start from `SessionOptions::default()` and change what is needed.
@@ -36,6 +49,8 @@ pub struct SessionOptions {
     pub gaze_guidance: Option<f32>,
     /// Scale of the noise that blocks start from, 0 to 2; `None` for the bundle's. Less gives calmer motion.
     pub temperature: Option<f32>,
+    /// Flow time at which history enters the reference network.
+    pub history: HistoryTime,
     /// Where the agent stands at the start, in the caller's world.
     pub start: Root,
     /// Storage of the key-value caches; f16 but for checks of the maths.
@@ -58,6 +73,7 @@ impl Default for SessionOptions {
             guidance: None,
             gaze_guidance: None,
             temperature: None,
+            history: HistoryTime::Bundle,
             start: Root::default(),
             cache: KvDtype::F16,
             anchoring: Anchoring::Bundle,
@@ -73,6 +89,11 @@ impl SessionOptions {
         [self.guidance, self.gaze_guidance].into_iter().flatten().try_for_each(check_guidance)?;
         if let Some(t) = self.temperature.filter(|t| !(0.0..=2.0).contains(t)) {
             return Err(argument(format!("temperature {t}: 0 to 2")));
+        }
+        if let HistoryTime::Clean(c) = self.history
+            && ![c.tau, c.from].iter().all(|t| (0.0..=1.0).contains(t))
+        {
+            return Err(argument(format!("clean history at {} from {}: both are flow times, 0 to 1", c.tau, c.from)));
         }
         if !matches!(self.threads, 1 | 2) {
             return Err(argument(format!("threads is {}: 1 or 2", self.threads)));
@@ -92,6 +113,14 @@ impl SessionOptions {
 
     pub(super) fn temperature(&self, engine: &Engine) -> f32 {
         self.temperature.unwrap_or(engine.config.session.temperature)
+    }
+
+    pub(super) fn clean_history(&self, engine: &Engine) -> Option<CleanHistory> {
+        match self.history {
+            HistoryTime::Bundle => engine.config.session.clean_history,
+            HistoryTime::Imputed => None,
+            HistoryTime::Clean(c) => Some(c),
+        }
     }
 
     pub(super) fn guidance(&self, engine: &Engine) -> Guidance {

@@ -14,7 +14,7 @@ Contents (K blocks, T = 4 K frames):
     x1.{k} [NFE, 3 (U, C, F), Dz] of midpoint 4; latents [K, Dz]
     decoded_frames [n] frame numbers; decoded [n, F] standardised
     roots [T, 3] (x, z, yaw); positions [T, J, 3]; rotations [T, J, 4] (x, y, z, w) world
-    latents.midpoint2, latents.midpoint1 [K, Dz], with their own history and user in their own agent frame
+    latents.midpoint2, latents.midpoint1, latents.clean (midpoint 4, history at least at 0.9 from 0.3 on) [K, Dz], with their own history and user in their own agent frame
     student [K, Dz], student.user [K, 8]: history tau_h z + (1 - tau_h) eps at tau_h = tau_history, new token eps at 0
     encoder.frames [16, F] metres, encoder.mu, encoder.logvar [4, Dz]
 """
@@ -54,10 +54,10 @@ def listen(audio, voice, frames):
 class Session:
     """Runs a session of the bundle over given inputs with one of its samplers."""
 
-    def __init__(self, b, agent, voice, path, eps, eps_idle, steps=4, student=False):
+    def __init__(self, b, agent, voice, path, eps, eps_idle, steps=4, student=False, clean=None):
         m = len(b.idle()) // 4
         net, settings = (b.student, b.config["student"]) if student else (b.flow, b.config["session"])
-        reference = Reference(net, settings["guidance"], settings["gaze_guidance"])
+        reference = Reference(net, settings["guidance"], settings["gaze_guidance"], clean)
         self.idle = b.encode(b.idle()[None])
         none = absent(1, m, b.config["audio"]["features"])
         reference.push(self.idle, eps_idle[None], branches(none, True))
@@ -111,7 +111,7 @@ def compute(b, blocks=20, seed=7):
         "decoded_frames": some.int(), "decoded": main.decoded[some], "roots": main.roots.float(),
         "positions": torch.tensor(pos[1:]).float(), "rotations": torch.tensor(quat[1:]).float(),
         "latents.midpoint2": run(steps=2).z, "latents.midpoint1": run(steps=1).z,
-        "encoder.frames": test, "encoder.mu": enc_mu[0], "encoder.logvar": enc_logvar[0],
+        "latents.clean": run(clean=(0.9, 0.3)).z, "encoder.frames": test, "encoder.mu": enc_mu[0], "encoder.logvar": enc_logvar[0],
     }
     out |= {f"x1.{k}": x1 for k, x1 in enumerate(main.x1)}
     if b.student is not None:

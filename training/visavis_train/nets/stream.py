@@ -42,8 +42,9 @@ def midpoint(steps, eps, evaluate):
 class Reference:
     """One session, everything recomputed: tokens' latents, noise and conditions are kept for the whole session."""
 
-    def __init__(self, net, guidance, gaze_guidance):
-        self.net, self.guidance, self.gaze_guidance = net, guidance, gaze_guidance
+    def __init__(self, net, guidance, gaze_guidance, clean=None):
+        """`clean`: (tau_history, clean_from) of `history_time`, or None to impute history throughout."""
+        self.net, self.guidance, self.gaze_guidance, self.clean = net, guidance, gaze_guidance, clean or (None, 0.0)
         self.z, self.eps, self.cond = [], [], []
 
     def push(self, z, eps, cond):
@@ -59,8 +60,11 @@ class Reference:
         seen = []
 
         def evaluate(z, tau, slot):
-            rows = torch.cat([tau * done + (1 - tau) * noise, z], 1).expand(3, -1, -1)
-            x1 = self.net(rows, torch.full((3, 1), tau), every)[:, -1:]
+            past = history_time(tau, *self.clean)
+            rows = torch.cat([past * done + (1 - past) * noise, z], 1).expand(3, -1, -1)
+            taus = torch.full((3, rows.shape[1]), float(past))
+            taus[:, -1] = tau
+            x1 = self.net(rows, taus, every)[:, -1:]
             seen.append(x1[:, 0])
             return combine(x1, 3, self.guidance, self.gaze_guidance)
 
