@@ -12,11 +12,11 @@ from .signals import FPS, delay, follow, gaussian, keyed, minjerk, smooth_noise
 
 
 def draw_level(rng, r=None):
-    """Wanted mean gaze score of a stretch, 0..1: mostly contact, some shy, a few averted. `r`: quantile, else random."""
+    """Wanted mean gaze score of a stretch, 0..1: half contact, a quarter shy, a quarter averted. `r`: quantile, else random."""
     r = rng.random() if r is None else r
-    if r < 0.66:
+    if r < 0.52:
         return rng.uniform(0.80, 1.0)
-    if r < 0.85:
+    if r < 0.77:
         return rng.uniform(0.45, 0.80)
     return rng.uniform(-0.05, 0.45)
 

@@ -1,13 +1,16 @@
 """Builds the corpus: loads the real parts of each split, simulates the conversations and writes the clips."""
 import os
 import shutil
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 
 import numpy as np
 
 from ..motion import bvh
-from . import gestures, real, simulate, store, voices
+from . import gestures, plausible, real, simulate, store, voices
 
 SPLITS = ("train", "val", "test")
+RETRIES = 8
 
 
 def load_sources(data, split):
@@ -25,35 +28,84 @@ def split_hours(hours):
     return {"train": hours, "val": small, "test": small}
 
 
-def build(data, out, hours, seed=0, log=print):
-    """Writes OUT/{train,val,test}/*.safetensors; deterministic from `seed`. Built beside OUT and moved there when complete."""
+def clip_lengths(seed, s, hours):
+    """Frames of each simulated clip of split `s`: 1 to 2 minutes until `hours` are full."""
+    rng, left, out = np.random.default_rng([seed, s, 3]), int(hours * 3600 * 30), []
+    while left > 0:
+        out.append(int(rng.uniform(60, 120) * 30) // 4 * 4)
+        left -= out[-1]
+    return out
+
+
+def talk(rng_key, frames, src, quantile):
+    """One plausible conversation and the number of draws thrown away before it: [(clip, rejected reasons)]."""
+    rejected = []
+    for attempt in range(RETRIES):
+        clip = simulate.simulate_clip(np.random.default_rng([*rng_key, attempt]), frames, src, quantile)
+        reasons = plausible.faults(clip.positions, clip.rotations, plausible.SIMULATED)
+        if not reasons:
+            return clip, rejected
+        rejected += reasons
+    raise RuntimeError(f"conversation {rng_key}: no plausible draw in {RETRIES}: {', '.join(sorted(set(rejected)))}")
+
+
+_sources = None
+
+
+def _start(data, split):
+    """A worker's own copy of the sources."""
+    global _sources
+    _sources = load_sources(data, split)
+
+
+def _write_talk(job):
+    folder, seed, s, i, frames = job
+    clip, rejected = talk((seed, s, 2, i), frames, _sources, (0.35 + i * 0.6180339887) % 1.0)  # golden ratio: levels spread evenly
+    store.save(os.path.join(folder, f"talk_{i:05d}.safetensors"), clip.positions, clip.rotations, clip.user, clip.agent_voice, clip.user_voice,
+               {"split": SPLITS[s], "sources": clip.sources, "gaze_level": f"{clip.level.mean():.4f}", "seed": f"{seed}/{s}/{i}", "kind": "talk"})
+    return rejected
+
+
+def _real_clips(data, folder, split, seed, s):
+    """Writes the two-person takes and the chained walks; returns the reasons of what was left out."""
+    left_out = []
+    for name, p, r, u in real.two_person(data, split):
+        meta = {"split": split, "sources": ["cmu_two_person/" + name], "gaze_level": "nan", "seed": str(seed), "kind": "pair"}
+        left_out += _keep(os.path.join(folder, f"pair_{name}.safetensors"), p, r, u, meta)
+    for name, p, r, u, parts in real.walks(data, split, np.random.default_rng([seed, s, 1])):
+        meta = {"split": split, "sources": parts, "gaze_level": "nan", "seed": str(seed), "kind": "walk"}
+        left_out += _keep(os.path.join(folder, f"walk_{name}.safetensors"), p, r, u, meta)
+    return left_out
+
+
+def _keep(path, p, r, u, meta):
+    reasons = plausible.faults(p, r, plausible.CAPTURED)
+    if not reasons:
+        store.save(path, p, r, u, None, None, meta)
+    return reasons
+
+
+def build(data, out, hours, seed=0, log=print, workers=1):
+    """Writes OUT/{train,val,test}/*.safetensors; deterministic from `seed`, whatever the number of `workers` (processes).
+
+    Built beside OUT and moved there when complete. Every clip has passed `plausible.faults`."""
     tmp = out.rstrip("/") + ".partial"
     shutil.rmtree(tmp, ignore_errors=True)
     for s, split in enumerate(SPLITS):
         folder = os.path.join(tmp, split)
         os.makedirs(folder)
-        for name, p, r, u in real.two_person(data, split):
-            store.save(os.path.join(folder, f"pair_{name}.safetensors"), p, r, u, None, None,
-                       {"split": split, "sources": ["cmu_two_person/" + name], "gaze_level": "nan", "seed": str(seed), "kind": "pair"})
-        for name, p, r, u, parts in real.walks(data, split, np.random.default_rng([seed, s, 1])):
-            store.save(os.path.join(folder, f"walk_{name}.safetensors"), p, r, u, None, None,
-                       {"split": split, "sources": parts, "gaze_level": "nan", "seed": str(seed), "kind": "walk"})
-        src = load_sources(data, split)
-        left, i = int(split_hours(hours)[split] * 3600 * 30), 0
-        while left > 0:
-            rng = np.random.default_rng([seed, s, 2, i])
-            frames = int(rng.uniform(60, 120) * 30) // 4 * 4
-            clip = simulate.simulate_clip(rng, frames, src, (0.35 + i * 0.6180339887) % 1.0)  # golden ratio: levels spread evenly
-            store.save(os.path.join(folder, f"talk_{i:05d}.safetensors"), clip.positions, clip.rotations, clip.user,
-                       clip.agent_voice, clip.user_voice,
-                       {"split": split, "sources": clip.sources, "gaze_level": f"{clip.level.mean():.4f}",
-                        "seed": f"{seed}/{s}/{i}", "kind": "talk"})
-            left -= frames
-            i += 1
-        log(f"{split}: {i} conversations")
+        left_out = _real_clips(data, folder, split, seed, s)
+        jobs = [(folder, seed, s, i, n) for i, n in enumerate(clip_lengths(seed, s, split_hours(hours)[split]))]
+        with ProcessPoolExecutor(workers, get_context("spawn"), _start, (data, split)) as pool:
+            rejected = [r for reasons in pool.map(_write_talk, jobs, chunksize=4) for r in reasons]
+        log(f"{split}: {len(jobs)} conversations; drawn again: {counts(rejected)}; captured clips left out: {counts(left_out)}")
     old = out.rstrip("/") + ".old"
     shutil.rmtree(old, ignore_errors=True)
     if os.path.exists(out):
         os.rename(out, old)
     os.rename(tmp, out)
     shutil.rmtree(old, ignore_errors=True)
+
+
+def counts(reasons):
+    return ", ".join(f"{reasons.count(r)} {r}" for r in sorted(set(reasons))) or "none"

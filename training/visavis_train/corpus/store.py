@@ -70,10 +70,11 @@ def _write(path, tensors, meta):
             f.write(np.ascontiguousarray(tensors[k]).astype(tensors[k].dtype.newbyteorder("<"), copy=False).tobytes())
 
 
-def load(path):
-    """Reads and checks one clip."""
+def load(path, voices=True):
+    """Reads and checks one clip; `voices=False` leaves the voices on disk (absent in the result)."""
     with safe_open(path, framework="numpy") as f:
         keys, meta = set(f.keys()), f.metadata() or {}
+        keys -= set() if voices else {"agent_voice", "user_voice"}
         missing = {"positions", "rotations", "user_head"} - keys
         if missing:
             raise ClipError(f"{path}: tensors {sorted(missing)} are missing; see visavis_train/corpus/store.py for the format")

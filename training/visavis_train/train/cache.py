@@ -68,6 +68,7 @@ def main():
     parser.add_argument("--audio", required=True)
     parser.add_argument("--out", required=True)
     parser.add_argument("--waves", action="store_true", help="keep the voices too (i16), for flow training with --end-to-end")
+    parser.add_argument("--reuse", metavar="CACHE", help="take the voices' features of an earlier cache of this corpus (same audio encoder)")
     parser.add_argument("--threads", type=int, default=1)
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
@@ -76,15 +77,19 @@ def main():
     os.makedirs(args.out, exist_ok=True)
     stats = None
     for split in ("train", "val"):
-        items = []
+        items, heard = [], {}
+        if args.reuse:
+            old = torch.load(os.path.join(args.reuse, split + ".pt"), weights_only=False, mmap=True)["items"]
+            heard = {i["name"]: {k: i[k] for k in ("agent", "voice", "has")} for i in old}
         for path in clips(args.corpus, split):
-            clip, frames, roots, gaze = load_motion(path)
+            name = os.path.basename(path)
+            clip, frames, roots, gaze = load_motion(path, voices=args.waves or name not in heard)
             if len(frames) < 4 * 12 + 8:
                 continue
             x = (expand(frames) - mean) / std
             z = [encode(vae, x[p:p + (len(x) - p) // 4 * 4]) for p in PHASES]
-            item = {"name": os.path.basename(path), "z": z, "roots": roots, "user": torch.from_numpy(clip.user_head.copy()), "gaze": gaze}
-            item |= features(audio, clip, len(frames))
+            item = {"name": name, "z": z, "roots": roots, "user": torch.from_numpy(clip.user_head.copy()), "gaze": gaze}
+            item |= heard.get(name) or features(audio, clip, len(frames))
             if args.waves:
                 item["waves"] = [torch.from_numpy(v.copy()) if v is not None else None for v in (clip.agent_voice, clip.user_voice)]
             items.append(item)

@@ -41,9 +41,9 @@ def expand(c):
     return torch.cat([c[..., :3], verts.flatten(-3)], -1)
 
 
-def load_motion(path):
+def load_motion(path, voices=True):
     """One clip: its store.Clip, compact frames, roots [T, 3] and gaze score [T]."""
-    clip = store.load(path)
+    clip = store.load(path, voices)
     frames, roots = compact(clip.positions, clip.rotations)
     g = rig.gaze_score(clip.positions.astype(np.float64), rig.quat_to_mat(clip.rotations), clip.user_head)
     return clip, torch.from_numpy(frames), torch.from_numpy(roots), torch.from_numpy(g.astype(np.float32))
@@ -54,40 +54,44 @@ def clips(folder, split):
 
 
 class Motions:
-    """Compact frames of all clips of a split; `refresh` takes in clips that came since."""
+    """Compact frames of all clips of a split. `captured`: how much more often captured takes are drawn than their length says.
 
-    def __init__(self, folder, split, limit=None):
-        self.folder, self.split, self.limit, self.seen, self.items = folder, split, limit, set(), []
-        self.refresh()
+    Poses are kept beside the split in one file (`SPLIT.motions.pt`), made anew when the clips change."""
 
-    def refresh(self):
-        for path in clips(self.folder, self.split)[:self.limit]:
-            if path in self.seen:
-                continue
-            try:
-                frames = load_motion(path)[1]
-            except (OSError, ValueError, Exception) as error:  # a file still being written
-                print(f"skipped {path}: {error}", flush=True)
-                continue
-            self.seen.add(path)
+    def __init__(self, folder, split, limit=None, captured=1.0):
+        self.items, weights = [], []
+        kept = os.path.join(folder, split + ".motions.pt")
+        paths = clips(folder, split)[:limit]
+        names = [(os.path.basename(p), os.path.getsize(p)) for p in paths]
+        state = torch.load(kept, mmap=True) if os.path.exists(kept) else {}
+        if state.get("names") == names:
+            self.items = state["items"]
+            self.weights = torch.tensor([len(f) * (1.0 if t else captured) for f, t in zip(self.items, state["talk"])])
+            return
+        talk = []
+        for path in paths:
+            clip = store.load(path, voices=False)
+            frames = torch.from_numpy(compact(clip.positions, clip.rotations)[0])
             self.items.append(frames)
-        self.weights = torch.tensor([float(len(f)) for f in self.items])
-        return len(self.items)
+            talk.append(clip.meta.get("kind") == "talk")
+            weights.append(len(frames) * (1.0 if talk[-1] else captured))
+        self.weights = torch.tensor(weights)
+        if limit is None and self.items:
+            torch.save({"items": self.items, "talk": talk, "names": names}, f"{kept}.{os.getpid()}")
+            os.replace(f"{kept}.{os.getpid()}", kept)
 
     def sample(self, batch, frames):
         """Random windows [batch, frames, F] in metres."""
         out = []
-        for i in torch.multinomial(self.weights, batch, replacement=True).tolist():
+        long = torch.tensor([float(len(item) >= frames) for item in self.items])
+        for i in torch.multinomial(self.weights * long, batch, replacement=True).tolist():
             item = self.items[i]
-            spare = len(item) - frames
-            if spare < 0:
-                continue
-            at = int(torch.randint(0, spare + 1, (1,)))
+            at = int(torch.randint(0, len(item) - frames + 1, (1,)))
             out.append(item[at:at + frames])
         return expand(torch.stack(out))
 
 
-def statistics(motions, stride=3):
+def statistics(motions, stride=9):
     """Mean and deviation per channel; a joint's 36 channels share one deviation, at least 0.02 m."""
     x = expand(torch.cat([f[1::stride] for f in motions.items]))
     mean, std = x.mean(0), x.std(0)

@@ -14,6 +14,7 @@ from torch import nn
 from ..motion.features import RADIUS
 from ..nets.vae import Vae
 from . import common
+from .team import Team
 from .data import Motions, statistics
 from .geometry import FEET, HANDS, ROOT, integrate, local_positions, to_world
 
@@ -101,7 +102,10 @@ def main():
     parser.add_argument("--lr", type=float, default=1.5e-3)
     parser.add_argument("--kl", type=float, default=2e-5)
     parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--workers", type=int, default=1, help="processes, each with batches of its own")
     parser.add_argument("--limit", type=int, help="take at most this many clips")
+    parser.add_argument("--captured", type=float, default=3.0, help="captured takes are drawn this many times as often as their length says")
+    parser.add_argument("--compile", action="store_true", help="torch.compile the step: minutes at the start, then a step takes 0.7 of its time")
     parser.add_argument("--init", help="checkpoint whose weights to start from (schedule starts anew)")
     parser.add_argument("--decoder-only", action="store_true",
                         help="with --init: go on with the decoder alone, so that latents (and a flow trained on them) stay valid; latents get noise")
@@ -119,7 +123,8 @@ def main():
         net.load_state_dict(state["ema"])
         x = (Motions(args.corpus, args.evaluate, args.limit).sample(48, 4 * args.blocks) - state["mean"]) / state["std"]
         return print({k: round(v, 2) for k, v in evaluate(net.eval(), x, state["mean"], state["std"]).items()})
-    train, held = Motions(args.corpus, "train", args.limit), Motions(args.corpus, "val", args.limit)
+    team = Team(args.workers)
+    train, held = Motions(args.corpus, "train", args.limit, args.captured), Motions(args.corpus, "val", args.limit)
     if not train.items:
         raise SystemExit(f"no clips under {args.corpus}/train: build the corpus first (python -m visavis_train.corpus)")
     state = torch.load(args.out, weights_only=False) if args.resume else None
@@ -156,40 +161,57 @@ def main():
     log = common.Log(args.out + ".jsonl", args.resume)
     torch.manual_seed(1)
     check = ((held if held.items else train).sample(32, frames) - mean) / std
-    torch.manual_seed(2 + step)
-    total = {}
-    while clock.progress < 1:
-        x = (train.sample(args.batch, frames) - mean) / std
+    team.seed(2 + step)
+    total, progress = {}, clock.progress
+    def keep():
+        common.save(args.out, net=net.state_dict(), ema=ema.net.state_dict(), optim=optim.state_dict(), size=size, mean=mean, std=std,
+                    step=step, elapsed=clock.elapsed)
+
+    scale = {"kl": args.kl, "velocity": args.smooth, "acceleration": args.smooth}
+
+    def forward(x):
         with torch.autocast("cpu", torch.bfloat16):
-            if args.decoder_only:
-                with torch.no_grad():
-                    mu, logvar = (t.float() for t in net.encoder(x))
-                noise = (torch.randn_like(mu) @ noise_map.T) * (1.2 * torch.rand(len(mu), 1, 1))
-                y = net.decoder(mu + noise).float()
-            else:
-                y, mu, logvar = net(x)
+            y, mu, logvar = net(x)
         parts = losses(x, y, mean, std, mu, logvar, weights, jw)
-        scale = {"kl": args.kl, "velocity": args.smooth, "acceleration": args.smooth}
-        loss = sum(scale.get(k, 1.0) * v for k, v in parts.items())
-        common.set_rate(optim, common.rate(args.lr, step, clock.progress))
+        return sum(scale.get(k, 1.0) * v for k, v in parts.items()), parts
+
+    def forward_decoder(x):
+        with torch.autocast("cpu", torch.bfloat16):
+            with torch.no_grad():
+                mu, logvar = (t.float() for t in net.encoder(x))
+            noise = (torch.randn_like(mu) @ noise_map.T) * (1.2 * torch.rand(len(mu), 1, 1))
+            y = net.decoder(mu + noise).float()
+        parts = losses(x, y, mean, std, mu, logvar, weights, jw)
+        return sum(scale.get(k, 1.0) * v for k, v in parts.items()), parts
+
+    forward = forward_decoder if args.decoder_only else forward
+    if args.compile:
+        with torch.no_grad():
+            net(check[:2])  # makes the tables
+        forward = torch.compile(forward, dynamic=False)
+    while progress < 1:
+        loss, parts = forward((train.sample(args.batch, frames) - mean) / std)
+        common.set_rate(optim, common.rate(args.lr, step, progress))
         optim.zero_grad()
         loss.backward()
+        progress = team.average(net, clock.progress)
         nn.utils.clip_grad_norm_(net.parameters(), 1.0)
         optim.step()
         ema.update(net)
         step += 1
+        if not team.leads:
+            continue
         for k, v in parts.items():
             total[k] = total.get(k, 0) + v.item() / 100
         if step % 100 == 0:
             log.write(step=step, minutes=clock.elapsed / 60, **total, **(evaluate(ema.net, check, mean, std) if step % 200 == 0 else {}))
             total = {}
         if step % 200 == 0:
-            common.save(args.out, net=net.state_dict(), ema=ema.net.state_dict(), optim=optim.state_dict(), size=size, mean=mean, std=std,
-                        step=step, elapsed=clock.elapsed)
-            train.refresh()
-    log.write(step=step, minutes=clock.elapsed / 60, **evaluate(ema.net, check, mean, std))
-    common.save(args.out, net=net.state_dict(), ema=ema.net.state_dict(), optim=optim.state_dict(), size=size, mean=mean, std=std,
-                step=step, elapsed=clock.elapsed)
+            keep()
+    if team.leads:
+        log.write(step=step, minutes=clock.elapsed / 60, **evaluate(ema.net, check, mean, std))
+        keep()
+    team.close()
 
 
 if __name__ == "__main__":

@@ -1,0 +1,72 @@
+"""The decoder on roll-outs, processes that train together, bundles taken apart."""
+import subprocess
+import sys
+
+import torch
+
+from visavis_train import bundle, checkpoints, make_tiny
+from visavis_train.motion import rig
+from visavis_train.nets.flow import FlowNet
+from visavis_train.train import decoder, vae
+
+
+def still_body(frames=32):
+    """One pose held: standardised with mean 0 and deviation 1, so metres."""
+    x = make_tiny.sway(frames)[:1].repeat(frames, 1)
+    x[:, :3] = 0
+    low = x[0, 3:].reshape(-1, 12, 3).mean(1)[list(decoder.TOES), 1].min()
+    x[:, 3:].view(frames, -1, 3)[..., 1] -= low - 0.02  # toes on the floor
+    return x[None].clone()
+
+
+def test_a_body_that_stands_has_no_slide_and_a_root_that_creeps_does():
+    x = still_body()
+    size = x.shape[-1]
+    zero, one, w = torch.zeros(size), torch.ones(size), vae.channel_weights(size)
+    calm = decoder.free_losses(x, x, zero, one, w)
+    y = x.clone()
+    y[..., 0] = 0.003
+    creeping = decoder.free_losses(y, x, zero, one, w)
+    assert calm["stay"] == 0 and calm["free_slide"] < 0.01 and calm["jerk"] < 0.01
+    assert abs(creeping["free_slide"] / 10 - 0.003) < 5e-4
+    assert creeping["stay"] > 0
+
+
+def test_bones_are_measured_against_the_rig():
+    x = still_body()
+    size = x.shape[-1]
+    zero, one, w = torch.zeros(size), torch.ones(size), vae.channel_weights(size)
+    y = x.clone()
+    hand = 3 + 36 * rig.INDEX["leftHand"]
+    y[..., hand:hand + 36].view(*y.shape[:2], 12, 3)[..., 0] += 0.05
+    assert decoder.free_losses(y, x, zero, one, w)["bones"] > decoder.free_losses(x, x, zero, one, w)["bones"]
+
+
+def test_a_bundle_comes_apart_into_checkpoints_that_load(tmp_path):
+    tensors, config = make_tiny.build()
+    bundle.write(str(tmp_path / "b.safetensors"), tensors, config)
+    parts = checkpoints.split(bundle.read(str(tmp_path / "b.safetensors")))
+    assert set(parts) == {"audio", "vae", "flow", "student"}
+    state = parts["flow"]
+    net = FlowNet(state["latent"], state["audio"], **state["size"])
+    net.load_state_dict(state["ema"])
+    assert torch.equal(net.input.weight, tensors["flow.input.weight"].float())
+
+
+TEAM = """
+import sys, torch
+from visavis_train.train.team import Team
+team = Team(2)
+net = torch.nn.Linear(1, 1, bias=False)
+net.weight.grad = torch.full((1, 1), 2.0 if team.leads else 4.0)
+progress = team.average(net, 0.25 if team.leads else 0.9)
+open(sys.argv[1] + str(team.rank), "w").write(f"{net.weight.grad.item()} {progress}")
+team.close()
+"""
+
+
+def test_two_processes_average_gradients_and_agree_on_progress(tmp_path):
+    script = tmp_path / "team.py"
+    script.write_text(TEAM)
+    subprocess.run([sys.executable, str(script), str(tmp_path / "out")], check=True, timeout=100)
+    assert [(tmp_path / f"out{r}").read_text() for r in (0, 1)] == ["3.0 0.25", "3.0 0.25"]

@@ -1,0 +1,151 @@
+"""Goes on with the VAE's decoder alone, on latents like those that sessions give it; the encoder, and a flow trained on its latents, stay valid.
+
+    python -m visavis_train.train.decoder --corpus DIR --cache runs/cache --vae runs/vae.pt --flow runs/flow.pt [--student runs/student.pt] \\
+        --out runs/vae-fine.pt --minutes 10
+
+Half of a batch is corpus motion whose latents get noise like the flow's own errors, with the corpus as target. The other half are latents of
+roll-outs, which have no truth: there the decoder stays near what it was, with feet that it means to plant put still, bones of the
+rig's lengths, and accelerations (block borders weigh more) held down.
+"""
+import argparse
+
+import torch
+from torch import nn
+
+from ..motion import rig
+from ..nets.vae import Vae
+from . import common
+from .cache import load_vae
+from .data import Motions
+from .flow import error_factor
+from .geometry import FEET, ROOT, integrate, local_positions, to_world
+from .student import Rollouts
+from .team import Team
+from .vae import channel_weights, evaluate, joint_weights, losses
+from .windows import Windows
+
+TOES = (FEET[1], FEET[3])
+PLANTED = (0.045, 0.006)  # a toe below this height [m] and slower than this [m a frame] is meant to stand
+LENGTHS = torch.tensor([float((o ** 2).sum() ** 0.5) for o in rig.OFFSETS[1:]])
+
+
+def free_losses(y, before, mean, std, weights):
+    """Standardised frames [B, T, F] of roll-outs against what the decoder made of them `before`; weighted parts."""
+    place = lambda f: to_world(integrate((f * std + mean)[..., :ROOT]), local_positions(f * std + mean))
+    p, q = place(y), place(before)
+    toes, old = p[:, :, list(TOES)], q[:, :, list(TOES)]
+    still = (old[:, 1:, :, 1] < PLANTED[0]) & (old.diff(dim=1).norm(dim=-1) < PLANTED[1])
+    slide = ((toes.diff(dim=1)[..., [0, 2]].square().sum(-1) + 1e-8).sqrt() * still).sum() / (still.sum() + 1)
+    bones = (p[:, :, 1:] - p[:, :, list(rig.PARENTS[1:])]).norm(dim=-1) - LENGTHS
+    acc = (p.diff(dim=1).diff(dim=1).square().sum(-1) + 1e-8).sqrt().mean(-1)
+    border = (torch.arange(acc.shape[1]) % 4 >= 2).float()
+    return {"stay": ((y - before).square() * weights).mean(), "free_slide": 10 * slide, "bones": 20 * bones.abs().mean(),
+            "jerk": 6 * (acc * (1 + border)).mean()}
+
+
+class Free:
+    """Latents of roll-outs [N, K, Dz] as the decoder gets them, a part of them made anew now and then."""
+
+    def __init__(self, rollouts, nets, size=48):
+        self.rollouts, self.nets, self.z, self.size, self.turn = rollouts, nets, [], size, 0
+
+    def refresh(self, batch=12, temperature=0.75):
+        net, tau = self.nets[self.turn % len(self.nets)]
+        z = self.rollouts.make(net, batch, bool(torch.rand(1) < 0.6), tau, temperature)[0]
+        self.turn += 1
+        self.z = (self.z + list(z * self.rollouts.windows.std + self.rollouts.windows.mean))[-self.size:]
+
+    def sample(self, batch, blocks):
+        rows = [self.z[i] for i in torch.randint(0, len(self.z), (batch,)).tolist()]
+        at = torch.randint(0, rows[0].shape[0] - blocks + 1, (1,)).item()
+        return torch.stack(rows)[:, at:at + blocks]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    for name in ("corpus", "cache", "vae", "flow", "out"):
+        parser.add_argument(f"--{name}", required=True)
+    parser.add_argument("--student", help="roll-outs are this network's; without it only noise like the flow's errors is used")
+    parser.add_argument("--minutes", type=float, default=10)
+    parser.add_argument("--batch", type=int, default=8, help="windows of either half")
+    parser.add_argument("--blocks", type=int, default=32)
+    parser.add_argument("--lr", type=float, default=4e-4)
+    parser.add_argument("--free", type=float, default=1.0, help="factor on the losses of roll-outs")
+    parser.add_argument("--noise", type=float, default=1.2, help="greatest noise, in deviations of the flow's errors")
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--workers", type=int, default=1, help="processes, each with batches of its own")
+    parser.add_argument("--resume", action="store_true")
+    args = parser.parse_args()
+    torch.set_num_threads(args.threads)
+    torch.manual_seed(0)
+    team, frames = Team(args.workers), 4 * args.blocks
+    train, held = Motions(args.corpus, "train", captured=3.0), Motions(args.corpus, "val")
+    frozen, mean, std, first = load_vae(args.vae)
+    frozen.requires_grad_(False)
+    net, weights = Vae(len(mean), **first["size"]), channel_weights(len(mean))
+    jw = joint_weights((len(mean) - ROOT) // 36)
+    jw = jw / jw.mean()
+    net.load_state_dict(first["ema"])
+    net.encoder.requires_grad_(False)
+    factor = error_factor(args.flow, args.cache)
+    optim, ema, clock, step = common.optimiser(net, args.lr), common.Ema(net, 0.995), common.Clock(args.minutes), 0
+    if args.resume:
+        state = torch.load(args.out, weights_only=False)
+        net.load_state_dict(state["net"]), ema.net.load_state_dict(state["ema"]), optim.load_state_dict(state["optim"])
+        clock, step, ema.steps = common.Clock(args.minutes, state["elapsed"]), state["step"], state["step"]
+    free = None
+    if args.student:
+        from ..export import load_flow
+        student, state = load_flow(args.student)
+        windows = Windows(f"{args.cache}/train.pt", 64, 0, 0, 0, 0)
+        free = Free(Rollouts(windows, frozen, mean, std), [(student, state["tau_history"])])
+    log = common.Log(args.out + ".jsonl", args.resume) if team.leads else None
+    torch.manual_seed(1)
+    check = (held.sample(24, frames) - mean) / std
+    team.seed(2 + step)
+
+    def keep():
+        common.save(args.out, net=net.state_dict(), ema=ema.net.state_dict(), optim=optim.state_dict(), size=first["size"], mean=mean, std=std,
+                    step=step, elapsed=clock.elapsed)
+
+    total, progress = {}, clock.progress
+    while progress < 1:
+        if free and (len(free.z) < 24 or step % 60 == 0):
+            free.refresh()
+        x = (train.sample(args.batch, frames) - mean) / std
+        with torch.autocast("cpu", torch.bfloat16):
+            with torch.no_grad():
+                mu, logvar = (t.float() for t in net.encoder(x))
+            z = mu + (torch.randn_like(mu) @ factor.T) * (args.noise * torch.rand(len(mu), 1, 1))
+            count = len(z)
+            if free:
+                z = torch.cat([z, free.sample(args.batch, args.blocks)])
+                with torch.no_grad():
+                    before = frozen.decoder(z[count:]).float()
+            y = net.decoder(z).float()
+        parts = losses(x, y[:count], mean, std, mu, logvar, weights, jw)
+        parts.pop("kl")
+        if free:
+            parts |= {k: args.free * v for k, v in free_losses(y[count:], before, mean, std, weights).items()}
+        common.set_rate(optim, common.rate(args.lr, step, progress, 50))
+        optim.zero_grad()
+        sum(parts.values()).backward()
+        progress = team.average(net, clock.progress)
+        nn.utils.clip_grad_norm_(net.parameters(), 1.0)
+        optim.step()
+        ema.update(net)
+        step += 1
+        if team.leads:
+            total = {k: total.get(k, 0) + v.item() / 50 for k, v in parts.items()}
+            if step % 50 == 0:
+                log.write(step=step, minutes=clock.elapsed / 60, **total, **(evaluate(ema.net, check, mean, std) if step % 100 == 0 else {}))
+                total = {}
+                keep()
+    if team.leads:
+        log.write(step=step, minutes=clock.elapsed / 60, **evaluate(ema.net, check, mean, std))
+        keep()
+    team.close()
+
+
+if __name__ == "__main__":
+    main()
