@@ -35,7 +35,7 @@ def item(frames=160, latent=8):
     p, q = walker(frames)
     c, roots = data.compact(p, q)
     k = [(frames - o) // 4 for o in cache.PHASES]
-    return {"name": "a", "z": [torch.randn(n, latent) for n in k], "roots": torch.from_numpy(roots), "user": torch.randn(frames, 3) + 2,
+    return {"name": "a", "z": [torch.randn(n, latent) for n in k], "phases": cache.PHASES, "roots": torch.from_numpy(roots), "user": torch.randn(frames, 3) + 2,
             "gaze": torch.rand(frames), "agent": torch.randn(frames, 6).half(), "voice": torch.randn(frames, 6).half(), "has": (True, False)}
 
 

@@ -13,6 +13,8 @@ from .nets.flow import FlowNet
 from .nets.vae import Vae
 
 FORMAT = 1
+SESSION = {"guidance": 2.0, "gaze_guidance": 1.5, "temperature": 0.75, "clean_history": {"tau": 0.9, "from": 0.3}, "anchor_period": 90,
+           "anchor_radius": 8.0}
 KEY = "visavis"
 
 
@@ -122,15 +124,14 @@ def read(path):
         load_net("student", flow_from(config["flow"], latent, audio_features), tensors) if config.get("student") else None)
 
 
-def make_config(rig, audio_layers, audio_features, vae, flow, *, name, description, licence, student=None, radius=0.1):
-    """The configuration in the shape of src/config.rs. `vae` and `flow` are dicts of their fields."""
+def make_config(rig, audio_layers, audio_features, vae, flow, *, name, description, licence, student=None, radius=0.1, session=None):
+    """The configuration in the shape of src/config.rs. `vae` and `flow` are dicts of their fields, `session` of those that differ from `SESSION`."""
     return {
         "format": FORMAT, "name": name, "description": description, "licence": licence,
         "user_delay_blocks": 1, "agent_delay_blocks": 0, "rig": rig, "pose": {"radius": radius},
         "audio": {"layers": [dict(zip(("inputs", "outputs", "kernel", "stride", "residual"), s)) for s in audio_layers], "features": audio_features},
         "vae": vae, "flow": flow, "student": student,
-        "session": {"guidance": 1.3, "gaze_guidance": 1.5, "temperature": 0.75, "anchor_period": 90,
-                    "anchor_radius": 8.0},
+        "session": SESSION | (session or {}),
     }
 
 

@@ -58,7 +58,7 @@ def load_flow(path):
     return net.eval(), state
 
 
-def assemble(audio, vae_path, flow_path, student_path, idle, name):
+def assemble(audio, vae_path, flow_path, student_path, idle, name, session=None):
     """Tensors and configuration of a bundle."""
     vae, mean, std, vae_state = load_vae(vae_path)
     flow, state = load_flow(flow_path)
@@ -74,7 +74,7 @@ def assemble(audio, vae_path, flow_path, student_path, idle, name):
         tensors |= bundle.net_tensors(prefix, net)
     rig_json = bundle.rig_config(rig.NAMES, rig.PARENTS, rig.OFFSETS, rig.EYES, rig.HEAD_BACK)
     config = bundle.make_config(rig_json, audio.spec, audio.out.out_features, vae_state["size"], state["size"], name=name,
-                                description=DESCRIPTION, licence=LICENCE, student=student)
+                                description=DESCRIPTION, licence=LICENCE, student=student, session=session)
     return tensors, config
 
 
@@ -88,6 +88,8 @@ def main():
     parser.add_argument("--idle-from", help="take the idle clip of this bundle")
     parser.add_argument("--half", action="store_true", help="fp16 weights")
     parser.add_argument("--half-student", action="store_true", help="fp16 weights for the student only")
+    for name in ("guidance", "gaze-guidance", "temperature"):
+        parser.add_argument(f"--{name}", type=float, help="default of sessions")
     args = parser.parse_args()
     if args.idle_frames % 4:
         raise SystemExit("--idle-frames must be a multiple of 4")
@@ -98,7 +100,8 @@ def main():
         if idle is None:
             raise SystemExit(f"no conversation clips under {args.corpus}/train")
         print(f"idle clip from {where}")
-    tensors, config = assemble(load_audio(args.audio), args.vae, args.flow, args.student, idle, args.name)
+    tensors, config = assemble(load_audio(args.audio), args.vae, args.flow, args.student, idle, args.name,
+                               {k: v for k in ("guidance", "gaze_guidance", "temperature") if (v := getattr(args, k)) is not None})
     bundle.write(args.out, tensors, config, half=args.half, narrow=("student.",) if args.half_student else ())
     print(f"{args.out}: {os.path.getsize(args.out) / 1e6:.1f} MB")
 

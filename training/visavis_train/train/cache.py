@@ -2,7 +2,8 @@
 
     python -m visavis_train.train.cache --corpus DIR --vae runs/vae.pt --audio runs/audio.pt --out runs/cache
 
-Writes OUT/{train,val}.pt. Latents are encoded at two phases (frame offsets 4 and 6), so that a window need not start where a clip does.
+Writes OUT/{train,val}.pt. Latents are encoded at two phases (frame offsets 4 and 6), so that a window need not start where a clip does; with
+`--phases 1` at one of them, in turn over the clips, for half the time. Without `--vae` only the voices are heard, for `--reuse` by a later call.
 """
 import argparse
 import os
@@ -11,10 +12,11 @@ import torch
 
 from ..nets.audio import AudioEncoder
 from ..nets.vae import Vae
+from .team import Team
 from .data import clips, expand, load_motion
 
 PHASES = (4, 6)
-CHUNK, OVERLAP = 96, 40
+CHUNK, OVERLAP = 48, 24  # the encoder sees 16 blocks a layer; more overlap changes latents by 0.2 % of their deviation
 
 
 def load_vae(path):
@@ -64,15 +66,19 @@ def features(audio, clip, frames):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--corpus", required=True)
-    parser.add_argument("--vae", required=True)
+    parser.add_argument("--vae")
     parser.add_argument("--audio", required=True)
     parser.add_argument("--out", required=True)
+    parser.add_argument("--conversations", type=int, help="take only this many of a split's conversations (and all captured takes)")
+    parser.add_argument("--phases", type=int, default=2, choices=(1, 2))
+    parser.add_argument("--workers", type=int, default=1, help="processes that share the clips")
     parser.add_argument("--waves", action="store_true", help="keep the voices too (i16), for flow training with --end-to-end")
     parser.add_argument("--reuse", metavar="CACHE", help="take the voices' features of an earlier cache of this corpus (same audio encoder)")
     parser.add_argument("--threads", type=int, default=1)
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
-    vae, mean, std, _ = load_vae(args.vae)
+    team = Team(args.workers)
+    vae, mean, std, _ = load_vae(args.vae) if args.vae else (None,) * 4
     audio = load_audio(args.audio)
     os.makedirs(args.out, exist_ok=True)
     stats = None
@@ -81,25 +87,33 @@ def main():
         if args.reuse:
             old = torch.load(os.path.join(args.reuse, split + ".pt"), weights_only=False, mmap=True)["items"]
             heard = {i["name"]: {k: i[k] for k in ("agent", "voice", "has")} for i in old}
-        for path in clips(args.corpus, split):
+        paths = clips(args.corpus, split)
+        talks = [p for p in paths if os.path.basename(p).startswith("talk")]
+        skip = set(talks[args.conversations:] if args.conversations else ())
+        for n, path in list(enumerate(p for p in paths if p not in skip))[team.rank::team.size]:
             name = os.path.basename(path)
             clip, frames, roots, gaze = load_motion(path, voices=args.waves or name not in heard)
             if len(frames) < 4 * 12 + 8:
                 continue
-            x = (expand(frames) - mean) / std
-            z = [encode(vae, x[p:p + (len(x) - p) // 4 * 4]) for p in PHASES]
-            item = {"name": name, "z": z, "roots": roots, "user": torch.from_numpy(clip.user_head.copy()), "gaze": gaze}
+            phases = PHASES if args.phases == 2 else PHASES[n // team.size % 2:][:1]
+            x = (expand(frames) - mean) / std if vae else None
+            z = [encode(vae, x[p:p + (len(x) - p) // 4 * 4]) for p in phases] if vae else []
+            item = {"name": name, "z": z, "phases": phases, "roots": roots, "user": torch.from_numpy(clip.user_head.copy()), "gaze": gaze}
             item |= heard.get(name) or features(audio, clip, len(frames))
             if args.waves:
                 item["waves"] = [torch.from_numpy(v.copy()) if v is not None else None for v in (clip.agent_voice, clip.user_voice)]
             items.append(item)
-        if stats is None:
+        items = team.gather(items, os.path.join(args.out, f"{split}.part"))
+        if not team.leads:
+            continue
+        if stats is None and vae:
             every = torch.cat([i["z"][0] for i in items])
             stats = every.mean(0), every.std(0).clamp(min=1e-3)
         for item in items:
             item["z"] = [(z - stats[0]) / stats[1] for z in item["z"]]
-        torch.save({"items": items, "latent_mean": stats[0], "latent_std": stats[1]}, os.path.join(args.out, split + ".pt"))
+        torch.save({"items": items} | ({"latent_mean": stats[0], "latent_std": stats[1]} if vae else {}), os.path.join(args.out, split + ".pt"))
         print(f"{split}: {len(items)} clips, {sum(len(i['gaze']) for i in items) / 108000:.2f} hours", flush=True)
+    team.close()
 
 
 if __name__ == "__main__":

@@ -45,12 +45,14 @@ class Batch:
 
 
 @torch.no_grad()
-def roll(b, batch, target=None, student=False, steps=4, seed=0, guidance=None, gaze_guidance=None, tau_history=None, clean_from=0.0, temperature=None):
-    """Generated feature vectors [B, T, F] in metres and roots [B, T, 3]. `target`: gaze score or None. `tau_history`, `clean_from`: see `history_time`.
+def roll(b, batch, target=None, student=False, steps=4, seed=0, guidance=None, gaze_guidance=None, tau_history=None, clean_from=None, temperature=None):
+    """Generated feature vectors [B, T, F] in metres and roots [B, T, 3]. `target`: gaze score or None. `tau_history`, `clean_from`: see `history_time`; the bundle's by default, 1 and 2 impute history throughout.
     `temperature` scales the noise that blocks start from; the bundle's by default."""
     g = torch.Generator().manual_seed(seed)
     n, session = len(batch), b.config["session"]
     latent, width = b.config["vae"]["latent"], b.config["audio"]["features"]
+    clean = session.get("clean_history") or {"tau": None, "from": 0.0}
+    tau_history, clean_from = clean["tau"] if tau_history is None else tau_history, clean["from"] if clean_from is None else clean_from
     stream = Stream(b.student if student else b.flow, n, session["guidance"] if guidance is None else guidance,
                     session["gaze_guidance"] if gaze_guidance is None else gaze_guidance, target is not None, steps,
                     b.config["student"]["tau_history"] if student else tau_history,
@@ -149,7 +151,7 @@ def main():
     parser.add_argument("--guidance", type=float)
     parser.add_argument("--gaze-guidance", type=float)
     parser.add_argument("--tau-history", type=float, help="history at this flow time in evaluations from --clean-from on")
-    parser.add_argument("--clean-from", type=float, default=0.0)
+    parser.add_argument("--clean-from", type=float)
     parser.add_argument("--temperature", type=float, help="scale of the noise; default the bundle's")
     parser.add_argument("--sheet")
     parser.add_argument("--threads", type=int, default=1)

@@ -15,7 +15,8 @@ from torch import nn
 from ..nets.flow import GAZE, Condition, FlowNet
 from ..nets.stream import DecoderStream, Stream, branches, combine, history_time, midpoint
 from . import common
-from .cache import PHASES, load_vae
+from .team import Team
+from .cache import load_vae
 from .flow import noisy, x1_error
 from .geometry import integrate, to_local
 from .windows import Windows
@@ -52,9 +53,9 @@ class Rollouts:
         w, n, warm = self.windows, self.windows.blocks, self.warm
         picks, cuts, worlds, starts = torch.multinomial(w.weights, size, replacement=True).tolist(), [], [], []
         for i in picks:
-            item, phase = w.items[i], int(torch.randint(0, len(PHASES), (1,)))
+            item, phase = w.items[i], int(torch.randint(0, len(w.items[i]["phases"]), (1,)))
             at = int(torch.randint(0, len(item["z"][phase]) - n + 1, (1,)))
-            first = PHASES[phase] + 4 * at
+            first = item["phases"][phase] + 4 * at
             cuts.append(w.cut(item, phase, at, n))
             worlds.append(item["user"][first:first + 4 * n].double())
             starts.append(item["roots"][first + 4 * warm - 1])
@@ -106,10 +107,12 @@ def main():
     parser.add_argument("--temperature", type=float, default=0.75, help="scale of the noise, as sessions use it")
     parser.add_argument("--lr", type=float, default=4e-4)
     parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--workers", type=int, default=1, help="processes, each with teacher passes of its own")
     parser.add_argument("--resume", action="store_true")
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
     torch.manual_seed(3)
+    team = Team(args.workers)
     windows = Windows(os.path.join(args.cache, "train.pt"), args.blocks, 0.03, 0.02, 0, 0.05)
     vae, mean, std, _ = load_vae(args.vae)
     base = torch.load(args.flow, weights_only=False)
@@ -125,16 +128,19 @@ def main():
         ema.net.load_state_dict(state["ema"])
         optim.load_state_dict(state["optim"])
         clock, step, ema.steps = common.Clock(args.minutes, state["elapsed"]), state["step"], state["step"]
-    log, rollouts = common.Log(args.out + ".jsonl", args.resume), Rollouts(windows, vae, mean, std)
+    log, rollouts = common.Log(args.out + ".jsonl", args.resume) if team.leads else None, Rollouts(windows, vae, mean, std)
+    which = torch.Generator().manual_seed(step)  # the same kind of pass in all processes: none waits for the dearer one
+    team.seed(4 + step)
     store, losses, own_losses = [], [], []
 
     def keep():
         common.save(args.out, net=net.state_dict(), ema=ema.net.state_dict(), optim=optim.state_dict(), step=step, elapsed=clock.elapsed,
                     tau_history=args.tau_history, guidance=args.guidance, gaze_guidance=args.gaze_guidance, **kept)
 
-    while clock.progress < 1:
+    progress = clock.progress
+    while progress < 1:
         gaze = bool(torch.rand(1) < 0.6)
-        own = bool(torch.rand(1) < args.own * min(1.0, step / 200))
+        own = bool(torch.rand(1, generator=which) < args.own * min(1.0, step / 200))
         if own:
             history, eps, cond = rollouts.make(ema.net, args.teach, gaze, args.tau_history, args.temperature)
         else:
@@ -155,20 +161,23 @@ def main():
                 x1 = net.forward_pair(noisy(h, tau, e), tau, e, torch.zeros(1, 1), c)
             error = x1_error(x1, w, metric)[:, 4:].mean(1)
             loss = error.mean()
-            common.set_rate(optim, common.rate(args.lr, step, clock.progress, 50))
+            common.set_rate(optim, common.rate(args.lr, step, progress, 50))
             optim.zero_grad()
             loss.backward()
+            progress = team.average(net, clock.progress)
             nn.utils.clip_grad_norm_(net.parameters(), 1.0)
             optim.step()
             ema.update(net)
             step += 1
             losses.append(loss.item())
             own_losses += [v for v, i in zip(error.tolist(), rows) if store[i][4]]
-            if step % 100 == 0:
+            if team.leads and step % 100 == 0:
                 log.write(step=step, minutes=clock.elapsed / 60, loss=sum(losses) / len(losses), own=sum(own_losses) / max(1, len(own_losses)))
                 losses, own_losses = [], []
                 keep()
-    keep()
+    if team.leads:
+        keep()
+    team.close()
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ import torch
 import torch.nn.functional as F
 
 from ..nets.flow import GAZE, USER, Condition
-from .cache import PHASES
 from .geometry import to_local
 
 
@@ -37,13 +36,13 @@ class Windows:
 
     def one(self, i):
         item, n = self.items[i], self.blocks
-        phase = int(torch.randint(0, len(PHASES), (1,)))
+        phase = int(torch.randint(0, len(item["phases"]), (1,)))
         z = item["z"][phase]
         at = int(torch.randint(0, len(z) - n + 1, (1,)))
         return self.cut(item, phase, at, n)
 
     def cut(self, item, phase, at, n):
-        first = PHASES[phase] + 4 * at
+        first = item["phases"][phase] + 4 * at
         z = item["z"][phase][at:at + n]
         user = block_users(item["roots"], item["user"], first, n)
         frames = slice(first, first + 4 * n)
