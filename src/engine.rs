@@ -72,11 +72,19 @@ impl Engine {
         Self::from_file(&BundleFile::from_bytes(bytes, name), Kernels::detect()?)
     }
 
+    /// As [`Engine::from_bytes`], from memory that stays the caller's.
+    ///
+    /// # Errors
+    /// As [`Engine::load`].
+    pub fn from_slice(bytes: &[u8], name: &str) -> Result<Arc<Self>> {
+        Self::from_file(&BundleFile::from_slice(bytes, name), Kernels::detect()?)
+    }
+
     /// Loads an opened bundle for the given kernels.
     ///
     /// # Errors
     /// As [`Engine::load`].
-    pub fn from_file(file: &BundleFile, kernels: Kernels) -> Result<Arc<Self>> {
+    pub fn from_file(file: &BundleFile<'_>, kernels: Kernels) -> Result<Arc<Self>> {
         let (config, tensors) = file.parse()?;
         let engine = Self::build(config, &tensors, kernels).map_err(|e| e.with_path(file.path()))?;
         Ok(Arc::new(engine))

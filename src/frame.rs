@@ -46,14 +46,14 @@ pub struct Root {
 impl Root {
     /// Maps a point of the heading frame of this root to the world.
     pub fn to_world(&self, p: Vec3) -> Vec3 {
-        let (s, c) = self.yaw.sin_cos();
+        let (s, c) = libm::sincos(self.yaw);
         let (x, z) = (f64::from(p.x), f64::from(p.z));
         Vec3::new((self.x + c * x + s * z) as f32, p.y, (self.z - s * x + c * z) as f32)
     }
 
     /// Maps a point of the world to the heading frame of this root.
     pub fn to_local(&self, p: Vec3) -> Vec3 {
-        let (s, c) = self.yaw.sin_cos();
+        let (s, c) = libm::sincos(self.yaw);
         let (x, z) = (f64::from(p.x) - self.x, f64::from(p.z) - self.z);
         Vec3::new((c * x - s * z) as f32, p.y, (s * x + c * z) as f32)
     }
@@ -66,7 +66,7 @@ impl Root {
     /// The root one frame later: moved by `(vx, vz)` of this root's heading frame and turned by `dyaw`.
     #[must_use]
     pub fn advanced(&self, vx: f32, vz: f32, dyaw: f32) -> Self {
-        let (s, c) = self.yaw.sin_cos();
+        let (s, c) = libm::sincos(self.yaw);
         let (vx, vz) = (f64::from(vx), f64::from(vz));
         let yaw = self.yaw + f64::from(dyaw);
         let turn = std::f64::consts::TAU;

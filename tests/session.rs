@@ -260,3 +260,21 @@ fn temperature_scales_the_noise() {
     let refused = tiny().session(SessionOptions { temperature: Some(-0.1), ..options() });
     assert_eq!(refused.unwrap_err().kind(), ErrorKind::Argument);
 }
+
+#[test]
+fn warming_up_leaves_no_trace() {
+    let inputs = inputs();
+    let options = || SessionOptions { threads: 2, core_mask: Some(u64::MAX), ..options() };
+    let mut session = tiny().session(options()).unwrap();
+    session.push_agent_audio(&[0.5; 4800], 24_000).unwrap();
+    session.warm_up(3).unwrap();
+    assert_eq!((session.stats().blocks, session.next_due()), (0, 0.0));
+    assert_eq!(run(&mut session, &inputs, 6), motion(options(), &inputs, 6));
+    let one = tiny().session(SessionOptions { threads: 1, core_mask: Some(0), ..options() }).unwrap();
+    assert_eq!(one.worker_thread_ids().count(), 0, "nobody to pin");
+    if cfg!(target_os = "linux") {
+        assert_eq!(session.worker_thread_ids().count(), 1);
+        let refused = tiny().session(SessionOptions { core_mask: Some(0), ..options() });
+        assert_eq!(refused.unwrap_err().kind(), ErrorKind::Argument);
+    }
+}

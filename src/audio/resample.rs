@@ -8,6 +8,10 @@
 //! rubato starts at a fraction of an output sample. With `L` filter taps, `f` stored phases and `t = rate / 24000` input
 //! samples an output sample, its first output is centred on input `-L/2 + 1/f + t_0`, where `t_0` is its first step. The
 //! first step is chosen so that this is `-m t` for a whole `m`: dropping `m` outputs leaves one exactly at input 0.
+//!
+//! rubato sums in an order that depends on the CPU, and its filter on the platform's sine. So it runs in f64 and what comes
+//! out is rounded to multiples of 2^-20 (-120 dB): the same bits everywhere, but for a sample in some 10^9 that falls within
+//! an f64 error of the middle between two.
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::SAMPLE_RATE;
@@ -29,6 +33,8 @@ const PHASES: usize = 128;
 /// Output samples computed at once.
 const CHUNK: usize = 8;
 const WINDOW: WindowFunction = WindowFunction::BlackmanHarris;
+/// What comes out is a whole number of these, exact in f32 below 16 times full scale.
+const STEPS: f64 = (1 << 20) as f64;
 
 /// Refuses rates outside [`MIN_RATE`] to [`MAX_RATE`].
 pub(crate) fn check_rate(rate: u32) -> Result<()> {
@@ -120,12 +126,12 @@ fn outputs(inputs: u64, rate: u32) -> u64 {
 }
 
 struct Sinc {
-    inner: Async<f32>,
+    inner: Async<f64>,
     rate: u32,
     /// Input waiting for rubato; the first `filled` samples are valid.
-    input: Vec<f32>,
+    input: Vec<f64>,
     filled: usize,
-    output: [f32; CHUNK],
+    output: [f64; CHUNK],
     /// First step, input samples, and outputs to drop after it.
     first_step: f64,
     lead: usize,
@@ -187,7 +193,8 @@ impl Sinc {
             let need = self.inner.input_frames_next();
             let take = need.saturating_sub(self.filled).min(input.len());
             let (now, later) = input.split_at(take);
-            self.input[self.filled..self.filled + take].copy_from_slice(now);
+            let room = &mut self.input[self.filled..self.filled + take];
+            room.iter_mut().zip(now).for_each(|(to, s)| *to = f64::from(*s));
             self.filled += take;
             input = later;
             if self.filled < need {
@@ -216,7 +223,7 @@ impl Sinc {
         self.drop -= skip;
         if skip < made {
             self.given += (made - skip) as u64;
-            out(&self.output[skip..made]);
+            out(&self.output.map(|s| ((s * STEPS).round() / STEPS) as f32)[skip..made]);
         }
     }
 

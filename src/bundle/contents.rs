@@ -53,7 +53,7 @@ impl Contents {
     ///
     /// # Errors
     /// As [`BundleFile::parse`].
-    pub fn of(file: &BundleFile) -> Result<Self> {
+    pub fn of(file: &BundleFile<'_>) -> Result<Self> {
         let (config, tensors) = file.parse()?;
         Ok(Self { bytes: file.len(), config, tensors: tensors.infos() })
     }

@@ -3,7 +3,7 @@
 use super::{CONFIG_KEY, Tensors, check};
 use crate::config::{Config, FORMAT};
 use crate::error::{Error, ErrorKind, Result};
-use memmap2::Mmap;
+use memmap2::{Mmap, MmapOptions};
 use safetensors::SafeTensors;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -13,18 +13,19 @@ const MAX_HEADER: u64 = 16 << 20;
 
 /// An opened bundle: its bytes, with the container already checked.
 #[derive(Debug)]
-pub struct BundleFile {
-    bytes: Bytes,
+pub struct BundleFile<'a> {
+    bytes: Bytes<'a>,
     path: PathBuf,
 }
 
 #[derive(Debug)]
-enum Bytes {
+enum Bytes<'a> {
     Mapped(Mmap),
     Owned(Vec<u8>),
+    Borrowed(&'a [u8]),
 }
 
-impl BundleFile {
+impl<'a> BundleFile<'a> {
     /// Maps the file at `path`.
     ///
     /// The file must not be changed or truncated while an engine is being loaded from it; afterwards it is not read
@@ -35,21 +36,44 @@ impl BundleFile {
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let io = |e| Error::io("open the bundle", path, e);
-        let file = File::open(path).map_err(io)?;
-        if file.metadata().map_err(io)?.len() == 0 {
+        Self::open_part(&File::open(path).map_err(io)?, 0, None, path)
+    }
+
+    /// Maps `length` bytes from `offset` on of an open file (`None`: all that follow): a bundle that lies in another file,
+    /// such as an asset that is stored uncompressed in an APK. `name` stands for it in errors. The file may be closed
+    /// afterwards; otherwise as [`BundleFile::open`].
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`] when it cannot be mapped, [`ErrorKind::Argument`] when the file is shorter.
+    pub fn open_part(file: &File, offset: u64, length: Option<u64>, name: impl Into<PathBuf>) -> Result<Self> {
+        let path = name.into();
+        let io = |e| Error::io("map the bundle", &path, e);
+        let there = file.metadata().map_err(io)?.len();
+        let length = length.unwrap_or(there.saturating_sub(offset));
+        if offset.checked_add(length).is_none_or(|end| end > there) {
+            let message =
+                format!("{length} bytes from offset {offset} on are asked for, but the file has {there} bytes");
+            return Err(Error::new(ErrorKind::Argument, message).with_path(path));
+        }
+        if length == 0 {
             return Err(corrupt("the file is empty; fetch the bundle again").with_path(path));
         }
         #[allow(unsafe_code, reason = "mapping a file is unsafe by nature")]
         // SAFETY: the map is read-only and private. Should another process change the file while it is being read,
         // the reader may see changed numbers (they are checked after copying) or, if the file shrinks, a bus error:
         // the condition stated above.
-        let map = unsafe { Mmap::map(&file) }.map_err(io)?;
-        Ok(Self { bytes: Bytes::Mapped(map), path: path.to_path_buf() })
+        let map = unsafe { MmapOptions::new().offset(offset).len(length as usize).map(file) }.map_err(io)?;
+        Ok(Self { bytes: Bytes::Mapped(map), path })
     }
 
     /// Takes a bundle that is already in memory; `name` stands for it in errors.
     pub fn from_bytes(bytes: Vec<u8>, name: impl Into<PathBuf>) -> Self {
         Self { bytes: Bytes::Owned(bytes), path: name.into() }
+    }
+
+    /// As [`BundleFile::from_bytes`], without taking or copying the bytes.
+    pub fn from_slice(bytes: &'a [u8], name: impl Into<PathBuf>) -> Self {
+        Self { bytes: Bytes::Borrowed(bytes), path: name.into() }
     }
 
     /// The file's path, or the name given to [`BundleFile::from_bytes`].
@@ -71,6 +95,7 @@ impl BundleFile {
         match &self.bytes {
             Bytes::Mapped(map) => map,
             Bytes::Owned(bytes) => bytes,
+            Bytes::Borrowed(bytes) => bytes,
         }
     }
 

@@ -226,7 +226,7 @@ impl Modulation {
 fn sinusoids(tau: f32, out: &mut [f32]) {
     let half = out.len() / 2;
     for i in 0..half {
-        let angle = 1000.0 * f64::from(tau) * 10_000f64.powf(-(i as f64) / half as f64);
+        let angle = 1000.0 * f64::from(tau) * libm::pow(10_000.0, -(i as f64) / half as f64);
         out[i] = libm::cos(angle) as f32;
         out[half + i] = libm::sin(angle) as f32;
     }

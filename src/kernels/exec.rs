@@ -110,6 +110,11 @@ impl Exec {
         self.pool.threads()
     }
 
+    /// The pool of threads.
+    pub fn pool(&self) -> &Pool {
+        &self.pool
+    }
+
     /// Starts a stretch of work: the helper wakes up and spins, and denormals count as zero on both threads. Calling it twice is harmless.
     pub fn begin(&mut self) {
         self.flush.get_or_insert_with(FlushToZero::new);

@@ -18,7 +18,7 @@ pub struct Phases {
 impl Rope {
     /// Frequencies `10000^(-2i / head_dim)`, `i` below `head_dim / 2`.
     pub fn new(head_dim: usize) -> Self {
-        let frequencies = (0..head_dim / 2).map(|i| 10_000f64.powf(-2.0 * i as f64 / head_dim as f64)).collect();
+        let frequencies = (0..head_dim / 2).map(|i| libm::pow(10_000.0, -2.0 * i as f64 / head_dim as f64)).collect();
         Self { frequencies }
     }
 

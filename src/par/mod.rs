@@ -4,8 +4,10 @@
 //! awake, from the back, until they meet. The helper spins only between [`Pool::begin`] and [`Pool::end`] and is parked otherwise.
 //! Between those two nothing allocates, locks or enters the kernel. Waking and parking, which do, happen inside them.
 
+mod cores;
 mod denormals;
 mod pool;
 
+pub use cores::{current_thread_id, pin_current_thread};
 pub use denormals::FlushToZero;
 pub use pool::Pool;

@@ -5,10 +5,12 @@ use std::cell::UnsafeCell;
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::thread::{self, JoinHandle};
 
 use super::FlushToZero;
+use super::cores::{self, current_thread_id};
+use crate::error::Result;
 
 /// Pieces of one [`Pool::run`], at most.
 const MAX_PIECES: usize = u16::MAX as usize;
@@ -91,6 +93,7 @@ impl Shared {
 pub struct Pool {
     shared: Arc<Shared>,
     helper: Option<JoinHandle<()>>,
+    helper_id: Option<u32>,
     run: u32,
 }
 
@@ -109,18 +112,35 @@ impl Pool {
             work: UnsafeCell::new(None),
             payload: Mutex::new(None),
         });
-        let helper = if threads > 1 {
-            let shared = Arc::clone(&shared);
-            Some(thread::Builder::new().name("visavis-helper".into()).spawn(move || shared.help())?)
-        } else {
-            None
-        };
-        Ok(Self { shared, helper, run: 0 })
+        if threads < 2 {
+            return Ok(Self { shared, helper: None, helper_id: None, run: 0 });
+        }
+        let (tell, told) = mpsc::channel();
+        let theirs = Arc::clone(&shared);
+        let helper = thread::Builder::new().name("visavis-helper".into()).spawn(move || {
+            let _ = tell.send(current_thread_id());
+            drop(tell);
+            theirs.help();
+        })?;
+        Ok(Self { shared, helper: Some(helper), helper_id: told.recv().ok().flatten(), run: 0 })
     }
 
     /// Number of threads: 1 or 2.
     pub fn threads(&self) -> usize {
         1 + usize::from(self.helper.is_some())
+    }
+
+    /// The kernel's id of the helper thread; `None` without a helper, or where threads have no such id.
+    pub fn helper_id(&self) -> Option<u32> {
+        self.helper_id
+    }
+
+    /// Lets the helper run only on the cores of `mask` (bit i: core i); does nothing without a helper.
+    ///
+    /// # Errors
+    /// As [`super::pin_current_thread`].
+    pub fn pin_helper(&self, mask: u64) -> Result<()> {
+        if self.helper.is_none() { Ok(()) } else { cores::pin(self.helper_id, mask) }
     }
 
     /// Wakes the helper; from now until [`end`](Self::end) it spins for work.
@@ -244,6 +264,18 @@ mod tests {
             }
         });
         assert!(helped.load(Ordering::Acquire));
+    }
+
+    #[test]
+    fn the_helper_is_known_and_can_be_pinned() {
+        let (one, two) = (Pool::new(1).unwrap(), Pool::new(2).unwrap());
+        assert_eq!(one.helper_id(), None);
+        assert!(one.pin_helper(0).is_ok(), "there is nobody to pin");
+        if cfg!(target_os = "linux") {
+            assert!(two.helper_id().is_some_and(|id| Some(id) != current_thread_id()));
+            two.pin_helper(u64::MAX).unwrap();
+            assert!(two.pin_helper(0).is_err());
+        }
     }
 
     #[test]

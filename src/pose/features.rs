@@ -18,8 +18,8 @@ pub const fn feature_count(joints: usize) -> usize {
 /// Hips whose +Z axis is upright (within 0.6 degrees) have no heading; they get `yaw`, best that of the frame before.
 pub fn root_of(hips: &Transform, yaw: f64) -> Root {
     let z = hips.rotation * Vec3::Z;
-    let upright = z.x.hypot(z.z) < 0.01;
-    let yaw = if upright { yaw } else { f64::from(z.x).atan2(f64::from(z.z)) };
+    let upright = libm::hypotf(z.x, z.z) < 0.01;
+    let yaw = if upright { yaw } else { libm::atan2(f64::from(z.x), f64::from(z.z)) };
     Root { x: f64::from(hips.position.x), z: f64::from(hips.position.z), yaw }
 }
 
@@ -173,7 +173,7 @@ impl Encoder {
 
 /// `(vx, vz, dyaw)` from one root to the next: the inverse of [`Root::advanced`].
 fn step(from: Root, to: Root) -> [f32; 3] {
-    let (s, c) = from.yaw.sin_cos();
+    let (s, c) = libm::sincos(from.yaw);
     let (x, z) = (to.x - from.x, to.z - from.z);
     let turn = std::f64::consts::TAU;
     let dyaw = to.yaw - from.yaw;

@@ -169,17 +169,17 @@ fn limb_target(middle: Vec3, end: Vec3, (l1, l2): (f32, f32)) -> Vec3 {
     if height < 1e-6 || l1 < 1e-6 || far < 1e-6 {
         return middle;
     }
-    let decoded = height.atan2(along);
+    let decoded = libm::atan2f(height, along);
     let mut t = decoded;
     for _ in 0..LIMB_STEPS {
-        let (s, c) = t.sin_cos();
+        let (s, c) = libm::sincosf(t);
         let d = (l1 * l1 + far * far - 2.0 * l1 * far * c).max(1e-12).sqrt();
         let slope = l1 * far * s / d;
         let gradient = l1 * l1 * (t - decoded) + END_WEIGHT * (d - l2) * slope;
         t -= (gradient / (l1 * l1 + END_WEIGHT * slope * slope)).clamp(-0.5, 0.5);
         t = t.clamp(0.0, std::f32::consts::PI);
     }
-    let (s, c) = t.sin_cos();
+    let (s, c) = libm::sincosf(t);
     l1 * (c * u + s * aside / height)
 }
 

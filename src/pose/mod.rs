@@ -12,6 +12,7 @@ mod fit;
 mod gaze;
 mod humanoid;
 pub mod icosahedron;
+pub mod openxr;
 mod rig;
 mod stance;
 #[cfg(test)]

@@ -69,7 +69,7 @@ impl Stance {
         }
         let (was, is) = (points[1].0 - points[0].0, turned(points[1].1 - points[0].1, dyaw));
         // Positive yaw turns +Z towards +X: from `is` to `was`.
-        let twist = (was.x * is.y - was.y * is.x).atan2(was.dot(is));
+        let twist = libm::atan2f(was.x * is.y - was.y * is.x, was.dot(is));
         let dyaw = dyaw + weights[0].min(weights[1]) * twist;
 
         let slide = |f: usize| turned(points[f].1, dyaw) + Vec2::new(vx, vz) - points[f].0;
@@ -80,7 +80,7 @@ impl Stance {
 
 /// `(x, z)` turned by `yaw` about Y.
 fn turned(p: Vec2, yaw: f32) -> Vec2 {
-    let (s, c) = yaw.sin_cos();
+    let (s, c) = libm::sincosf(yaw);
     Vec2::new(c * p.x + s * p.y, c * p.y - s * p.x)
 }
 

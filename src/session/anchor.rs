@@ -174,7 +174,7 @@ impl Anchor {
     }
 
     fn consider(&mut self, root: &Root) {
-        let far = (root.x - self.anchor.x).hypot(root.z - self.anchor.z) > self.radius;
+        let far = libm::hypot(root.x - self.anchor.x, root.z - self.anchor.z) > self.radius;
         if far || self.blocks >= self.anchored_at + self.period {
             self.started = self.blocks.saturating_sub(self.capacity - 1);
             self.encoder.reset();

@@ -43,6 +43,7 @@ pub(super) struct BlockState {
 impl BlockState {
     pub(super) fn new(engine: &Engine, options: &SessionOptions) -> Result<Self> {
         let mut exec = engine.exec(options.threads)?;
+        options.core_mask.map_or(Ok(()), |mask| exec.pool().pin_helper(mask))?;
         let student = engine.student.as_ref().zip(engine.config.student.map(|s| s.tau_history));
         let generator_options = GeneratorOptions {
             sampler: options.sampler,
@@ -99,6 +100,10 @@ impl BlockState {
 
     pub(super) fn supports(&self, sampler: Sampler) -> bool {
         self.generator.supports(sampler)
+    }
+
+    pub(super) fn helper_thread_id(&self) -> Option<u32> {
+        self.exec.pool().helper_id()
     }
 
     pub(super) fn cache_bytes(&self) -> usize {

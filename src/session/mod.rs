@@ -188,6 +188,25 @@ impl Session {
         self.state.reset(&self.engine, &self.options)
     }
 
+    /// Computes `blocks` blocks for nothing and starts anew, so that pages, caches and the CPU's clock are warm when the
+    /// first real block is due. What was pushed before is dropped.
+    ///
+    /// # Errors
+    /// As [`Session::poll`] and [`Session::reset`].
+    pub fn warm_up(&mut self, blocks: u32) -> Result<()> {
+        self.reset()?;
+        for _ in 0..blocks {
+            self.poll(self.next_due())?;
+        }
+        self.reset()
+    }
+
+    /// The kernel's ids of the threads that this session owns and computes on, for performance hints: the second
+    /// thread's where there is one. The thread that calls [`Session::poll`] computes too ([`crate::par::current_thread_id`]).
+    pub fn worker_thread_ids(&self) -> impl Iterator<Item = u32> {
+        self.state.helper_thread_id().into_iter()
+    }
+
     /// Replaces the seeded noise of the coming tokens: `noise` holds `[tokens, latent]` values, for the idle clip's
     /// tokens first. Starts the session anew. For parity checks against other implementations.
     ///

@@ -39,6 +39,9 @@ pub struct SessionOptions {
     pub seed: u64,
     /// Threads that compute a block, 1 or 2. The result is the same.
     pub threads: usize,
+    /// Cores that the second thread may run on (bit i: core i); `None` for any. The first thread is the caller's own:
+    /// [`crate::par::pin_current_thread`].
+    pub core_mask: Option<u64>,
     /// Sampler at the start.
     pub sampler: Sampler,
     /// Gaze target, -1 to 1, or `None` for free gaze.
@@ -68,6 +71,7 @@ impl Default for SessionOptions {
         Self {
             seed: 0,
             threads: 1,
+            core_mask: None,
             sampler: Sampler::Midpoint(4),
             gaze: None,
             guidance: None,

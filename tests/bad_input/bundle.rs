@@ -211,3 +211,30 @@ fn inspecting_refuses_the_same_containers() {
     let e = contents(bytes[..bytes.len() / 2].to_vec()).unwrap_err();
     assert!(e.kind() == ErrorKind::BundleCorrupt && e.to_string().starts_with(NAME), "{e}");
 }
+
+/// A bundle as an asset inside another file, at an offset that is neither of a page nor of a number.
+#[test]
+fn a_bundle_inside_another_file() {
+    let (bytes, offset) = (tiny_bytes(), 4_097);
+    let mut outer = vec![0xAA; offset];
+    outer.extend_from_slice(&bytes);
+    outer.extend_from_slice(&[0xBB; 100]);
+    let path = std::env::temp_dir().join(format!("visavis-outer-{}", std::process::id()));
+    std::fs::write(&path, &outer).unwrap();
+    let file = std::fs::File::open(&path).unwrap();
+    let open = |offset, length| BundleFile::open_part(&file, offset, length, NAME);
+    let kind = |offset, length: u64| match open(offset, Some(length)) {
+        Ok(part) => part.parse().map(|_| ()).expect_err("must be refused").kind(),
+        Err(e) => e.kind(),
+    };
+    let (offset, length) = (offset as u64, bytes.len() as u64);
+    let whole = open(offset, Some(length)).unwrap();
+    let engine = Engine::from_file(&whole, visavis::kernels::Kernels::detect().unwrap()).unwrap();
+    assert_eq!(engine.config(), Engine::from_slice(&bytes, NAME).unwrap().config());
+    assert_eq!(kind(offset, length + 101), ErrorKind::Argument);
+    assert_eq!(kind(u64::MAX, 2), ErrorKind::Argument);
+    assert_eq!(kind(offset, 0), ErrorKind::BundleCorrupt);
+    assert_eq!(kind(offset + 1, length), ErrorKind::BundleCorrupt);
+    assert_eq!(kind(offset, length - 1), ErrorKind::BundleCorrupt);
+    std::fs::remove_file(&path).unwrap();
+}

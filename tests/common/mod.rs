@@ -62,7 +62,7 @@ pub struct Inputs {
 }
 
 impl Inputs {
-    /// Two syllable-like voices taking turns and a user who walks around the agent, `seconds` long.
+    /// Two syllable-like voices taking turns and a user who walks around the agent, `seconds` long; the same bits on every machine.
     pub fn circling(seconds: f64, rate: u32) -> Self {
         let n = (seconds * f64::from(rate)) as usize;
         let voice = |pitch: f64, turn: f64| -> Vec<f32> {
@@ -70,9 +70,10 @@ impl Inputs {
                 .map(|i| {
                     let t = i as f64 / f64::from(rate);
                     let speaks = (t / 3.0 + turn).rem_euclid(2.0) < 1.0;
-                    let level = (std::f64::consts::TAU * 3.7 * t).sin().max(0.0).powi(2);
-                    let tone: f64 =
-                        (1..8).map(|h| (std::f64::consts::TAU * pitch * f64::from(h) * t).sin() / f64::from(h)).sum();
+                    let level = libm::sin(std::f64::consts::TAU * 3.7 * t).max(0.0).powi(2);
+                    let tone: f64 = (1..8)
+                        .map(|h| libm::sin(std::f64::consts::TAU * pitch * f64::from(h) * t) / f64::from(h))
+                        .sum();
                     if speaks { (0.2 * level * tone) as f32 } else { 0.0 }
                 })
                 .collect()
@@ -81,7 +82,7 @@ impl Inputs {
             .map(|i| {
                 let t = i as f64 / 90.0;
                 let a = 0.5 * t;
-                (t, Vec3::new((1.7 * a.sin()) as f32, 1.65, (1.7 * a.cos()) as f32))
+                (t, Vec3::new((1.7 * libm::sin(a)) as f32, 1.65, (1.7 * libm::cos(a)) as f32))
             })
             .collect();
         Self { agent: voice(120.0, 0.0), user: voice(190.0, 1.0), rate, path }
