@@ -21,7 +21,6 @@ from .geometry import FEET, HANDS, ROOT, integrate, local_positions, to_world
 SIZES = {"base": dict(latent=64, layers=4, width=192, heads=4, mlp=4, window_blocks=16),
          "paper": dict(latent=256, layers=9, width=256, heads=4, mlp=4, window_blocks=16)}
 HORIZON = 16
-NOISE = 0.1  # greatest noise on latents when the decoder is trained alone, in deviations of the latents
 JOINT_WEIGHTS = {5: 2.0, 8: 1.5, 12: 1.5, 9: 3.0, 13: 3.0, 16: 2.0, 17: 2.0, 20: 2.0, 21: 2.0}
 
 
@@ -107,10 +106,6 @@ def main():
     parser.add_argument("--captured", type=float, default=3.0, help="captured takes are drawn this many times as often as their length says")
     parser.add_argument("--compile", action="store_true", help="torch.compile the step: minutes at the start, then a step takes 0.7 of its time")
     parser.add_argument("--init", help="checkpoint whose weights to start from (schedule starts anew)")
-    parser.add_argument("--decoder-only", action="store_true",
-                        help="with --init: go on with the decoder alone, so that latents (and a flow trained on them) stay valid; latents get noise")
-    parser.add_argument("--errors", nargs=2, metavar=("FLOW", "CACHE"),
-                        help="with --decoder-only: the noise is like the errors of this flow, so that the decoder does not turn them into jitter")
     parser.add_argument("--smooth", type=float, default=1.0, help="factor on the loss of velocities and accelerations")
     parser.add_argument("--evaluate", metavar="SPLIT", help="only print how well --out reconstructs that split")
     parser.add_argument("--resume", action="store_true")
@@ -140,18 +135,10 @@ def main():
     jw = joint_weights((features - ROOT) // 36)
     jw = jw / jw.mean()
     if first:
-        net.load_state_dict(first["ema" if args.decoder_only else "net"])
+        net.load_state_dict(first["net"])
     else:
         start_from_principal(net, (every - mean) / std, weights)
         del every
-    if args.decoder_only:
-        net.encoder.requires_grad_(False)
-        with torch.no_grad():
-            if args.errors:
-                from .flow import error_factor
-                noise_map = error_factor(*args.errors)
-            else:
-                noise_map = NOISE * torch.diag(net.encoder((train.sample(16, frames) - mean) / std)[0].flatten(0, 1).std(0))
     optim, ema = common.optimiser(net, args.lr), common.Ema(net, 0.998)
     clock, step = common.Clock(args.minutes), 0
     if state:
@@ -175,16 +162,6 @@ def main():
         parts = losses(x, y, mean, std, mu, logvar, weights, jw)
         return sum(scale.get(k, 1.0) * v for k, v in parts.items()), parts
 
-    def forward_decoder(x):
-        with torch.autocast("cpu", torch.bfloat16):
-            with torch.no_grad():
-                mu, logvar = (t.float() for t in net.encoder(x))
-            noise = (torch.randn_like(mu) @ noise_map.T) * (1.2 * torch.rand(len(mu), 1, 1))
-            y = net.decoder(mu + noise).float()
-        parts = losses(x, y, mean, std, mu, logvar, weights, jw)
-        return sum(scale.get(k, 1.0) * v for k, v in parts.items()), parts
-
-    forward = forward_decoder if args.decoder_only else forward
     if args.compile:
         with torch.no_grad():
             net(check[:2])  # makes the tables
