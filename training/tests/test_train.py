@@ -138,6 +138,17 @@ def test_teacher_over_a_window_equals_sampling_block_by_block():
         r.push(history[:, k:k + 1], eps[:, k:k + 1], at(k))
 
 
+def test_rotations_apart_is_the_angle():
+    p, q = walker(8)
+    turned = rig.quat_to_mat(q)
+    turned[:, 5] = turned[:, 5] @ rig.axis_mat("x", 0.08)
+    a = torch.from_numpy(features.to_features(p, q)).float()
+    b = torch.from_numpy(features.to_features(p, rig.mat_to_quat(turned))).float()
+    angle = vae.rotations_apart(a, b)
+    assert torch.allclose(angle[:, 5], torch.full((8,), 0.08), atol=2e-4)
+    assert angle[:, [j for j in range(22) if j != 5]].max() < 1e-3
+
+
 def test_flow_losses_fall_when_trained(tmp_path):
     w, net = made_windows(tmp_path), FlowNet(8, 6, layers=1, width=32, heads=4, mlp=2, tau_width=16, window_blocks=5, embed_latent=16,
                                              embed_user=8, embed_voice=12, embed_gaze=4)

@@ -40,17 +40,27 @@ def world(x, horizon):
     return to_world(integrate(x[..., :ROOT]), local_positions(x))
 
 
+def rotations_apart(a, b):
+    """Angle between the joints' rotations [..., J], radians, for small ones: feature vectors [..., F] in metres.
+
+    Vertices turned by a small angle t move by |R - R'| = sqrt(2) t over all axes, and sum_v |X_v|^2 = 4 r^2 |R|^2."""
+    axes = lambda f: (lambda v: v - v.mean(-2, keepdim=True))(f[..., ROOT:].unflatten(-1, (-1, 12, 3)))
+    return ((axes(a) - axes(b)).square().sum((-1, -2)) + 1e-10).sqrt() / (2 * RADIUS * 2 ** 0.5)
+
+
 def losses(x, y, mean, std, mu, logvar, weights, jw):
     """x, y standardised [B, T, F]; returns the parts, already weighted."""
     feature = ((x - y).square() * weights).mean()
-    p, q = world(x * std + mean, HORIZON), world(y * std + mean, HORIZON)
+    a, b = x * std + mean, y * std + mean
+    p, q = world(a, HORIZON), world(b, HORIZON)
+    rotation = (rotations_apart(a, b) * jw).mean()
     norm = lambda d: ((d.square().sum(-1) + 1e-8).sqrt() * jw).mean()
     vp, vq = p.diff(dim=2), q.diff(dim=2)
     feet = list(FEET)
     planted = (vp[..., feet, :].square().sum(-1) < 0.002 ** 2).float()
     slide = ((vq[..., feet, :].square().sum(-1) + 1e-8).sqrt() * planted).sum() / (planted.sum() + 1)
     kl = 0.5 * (mu.square() + logvar.exp() - 1 - logvar).sum(-1).mean()
-    return {"feature": feature, "position": 4 * norm(p - q), "velocity": 20 * norm(vp - vq), "acceleration": 10 * norm(vp.diff(dim=2) - vq.diff(dim=2)),
+    return {"feature": feature, "rotation": 0.5 * rotation, "position": 4 * norm(p - q), "velocity": 20 * norm(vp - vq), "acceleration": 10 * norm(vp.diff(dim=2) - vq.diff(dim=2)),
             "slide": 5 * slide, "kl": kl}
 
 
@@ -81,10 +91,7 @@ def evaluate(net, x, mean, std):
     planted = va.norm(dim=-1) < 0.002
     acc = pb.diff(dim=1).diff(dim=1).norm(dim=-1).mean(-1)
     border = torch.arange(acc.shape[1]) % 4 >= 2
-    axes = lambda f: (lambda v: v - v.mean(-2, keepdim=True))(f[..., ROOT:].unflatten(-1, (-1, 12, 3)))
-    # vertices turned by a small angle t move by |R - R'| = sqrt(2) t over all axes, and sum_v |X_v|^2 = 4 r^2 |R|^2
-    turn = (axes(a) - axes(b)).square().sum((-1, -2)).sqrt() / (2 * RADIUS) / 2 ** 0.5 * 57.3
-    return {"rotation_deg": turn.mean().item(), "joints_mm": error.mean().item(), "hands_mm": error[..., list(HANDS)].mean().item(), "feet_mm": error[..., feet].mean().item(),
+    return {"rotation_deg": 57.3 * rotations_apart(a, b).mean().item(), "joints_mm": error.mean().item(), "hands_mm": error[..., list(HANDS)].mean().item(), "feet_mm": error[..., feet].mean().item(),
             "root_step_mm": ((a - b)[..., :2].norm(dim=-1) * 1000).mean().item(), "root_1s_mm": drift[:, 29].mean().item(),
             "root_end_mm": drift[:, -1].mean().item(), "yaw_end_deg": (ra - rb)[:, -1, 2].abs().mean().item() * 57.3,
             "slide_mm": (vb.norm(dim=-1)[planted].mean() * 1000).item(), "seam": (acc[:, border].mean() / acc[:, ~border].mean()).item()}
