@@ -2,8 +2,10 @@
 //!
 //! Stored as JSON under the key `visavis` of the safetensors metadata; written by `training/visavis_train/export.py`.
 
+use crate::kernels::Scheme;
 use crate::pose::Rig;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// The format version that this build reads and writes.
 pub const FORMAT: u32 = 1;
@@ -37,6 +39,18 @@ pub struct Config {
     pub student: Option<StudentConfig>,
     /// Defaults for sessions.
     pub session: SessionConfig,
+    /// How the weights were quantised; none for a bundle as it was exported.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quantisation: Option<Quantisation>,
+}
+
+/// What the quantiser did to the weights.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Quantisation {
+    /// The scheme that was asked for.
+    pub scheme: Scheme,
+    /// Scheme of each weight matrix by its tensor's name; tensors that are not listed are floats.
+    pub tensors: BTreeMap<String, Scheme>,
 }
 
 /// Pose representation.

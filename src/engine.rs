@@ -5,7 +5,7 @@ use crate::bundle::{AudioSource, BundleFile, Tensors};
 use crate::config::Config;
 use crate::error::{Error, ErrorKind, Result};
 use crate::flow::{ConditionLayout, FlowNet};
-use crate::frame::BLOCK_FRAMES;
+use crate::frame::{BLOCK_FRAMES, Sampler};
 use crate::kernels::{Exec, Kernels, KvDtype, Limits};
 use crate::pose::feature_count;
 use crate::session::{Session, SessionOptions};
@@ -158,6 +158,24 @@ impl Engine {
     /// Blocks of the idle clip, which are the first tokens of every session.
     pub fn idle_blocks(&self) -> usize {
         self.idle.len() / self.latent.mean.len()
+    }
+
+    /// Bytes of all packed weights.
+    pub fn weight_bytes(&self) -> usize {
+        let net = |n: &FlowNet| n.pass_bytes() + n.condition_bytes() + n.modulation_bytes();
+        let flows = net(&self.flow) + self.student.as_ref().map_or(0, net);
+        flows + self.encoder.bytes() + self.decoder.bytes() + self.audio.bytes()
+    }
+
+    /// Bytes of packed weights that a block with `sampler` reads: the flow once an evaluation, the decoder once, the audio
+    /// encoder once a voice. Re-anchoring and slots that catch up come on top.
+    pub fn block_bytes(&self, sampler: Sampler) -> usize {
+        let net = match (sampler, &self.student) {
+            (Sampler::Single, Some(student)) => student,
+            _ => &self.flow,
+        };
+        let evaluations = sampler.evaluations();
+        evaluations * net.pass_bytes() + net.condition_bytes() + self.decoder.bytes() + 2 * self.audio.bytes()
     }
 
     /// Width of a pose feature vector.

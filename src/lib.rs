@@ -16,6 +16,7 @@ pub mod offline;
 #[allow(unsafe_code, reason = "the fork-join pool hands slices to its worker")]
 pub mod par;
 pub mod pose;
+pub mod quant;
 pub mod recording;
 pub mod session;
 pub mod trace;

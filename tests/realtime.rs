@@ -4,10 +4,11 @@
 
 mod common;
 
-use common::{Inputs, tiny};
+use common::{Inputs, tiny, tiny_in};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use visavis::frame::Sampler;
+use visavis::kernels::Scheme;
 use visavis::session::{Anchoring, SessionOptions};
 
 /// The system's allocator, counting what is asked of it while `WATCH` is set.
@@ -56,13 +57,13 @@ fn allocations(work: impl FnOnce()) -> u64 {
 }
 
 /// Every sampler, one and two threads, gaze on and off, sampler changes with their catching up, re-anchoring, voices of
-/// a rate that is resampled: after the first push of each voice, neither pushing nor computing allocates.
+/// a rate that is resampled, weights of every scheme: after the first push of each voice, neither pushing nor computing allocates.
 #[test]
 fn a_running_session_does_not_allocate() {
     assert!(allocations(|| drop(std::hint::black_box(vec![1u8]))) > 0, "the allocator counts");
-    let engine = tiny();
     let inputs = Inputs::circling(20.0, 48_000);
-    for threads in [1, 2] {
+    let engines = [tiny(), tiny_in(Scheme::F16), tiny_in(Scheme::I8), tiny_in(Scheme::I4)];
+    for (engine, threads) in engines.iter().flat_map(|e| [(e, 1), (e, 2)]) {
         let options = SessionOptions { threads, anchoring: Anchoring::Every(10), ..Default::default() };
         let mut session = engine.session(options).unwrap();
         let per_block = 6400;

@@ -116,7 +116,7 @@ fn build(
         x = if conv.residual { model.wire_node(format!("{name}.residual"), math::add(), &[y, x])?[0] } else { y };
         rows /= conv.stride;
     }
-    let weights = Tensor::from_shape(&[out.weights.rows, out.weights.cols], &out.to_f32())?;
+    let weights = Tensor::from_shape(&[out.weights.rows, out.weights.cols], &out.weights.to_f32())?;
     let weights = model.add_const("out.weight", weights)?;
     let bias = model.add_const("out.bias", Tensor::from_shape(&[1, out.bias.len()], out.bias)?)?;
     let product = EinSum::new("tc,oc->to".parse()?, f32::datum_type());
@@ -135,7 +135,7 @@ fn convolution(
     layer: &LayerWeights<'_>,
     x: OutletId,
 ) -> TractResult<OutletId> {
-    let kernel = Tensor::from_shape(&[conv.outputs, conv.kernel, conv.inputs], &layer.to_f32())?;
+    let kernel = Tensor::from_shape(&[conv.outputs, conv.kernel, conv.inputs], &layer.weights.to_f32())?;
     let kernel = model.add_const(format!("{name}.weight"), kernel)?;
     let bias = model.add_const(format!("{name}.bias"), tensor1(layer.bias))?;
     let op = Conv {

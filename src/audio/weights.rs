@@ -3,7 +3,7 @@
 use crate::config::{AudioConfig, ConvConfig};
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::FRAME_SAMPLES;
-use crate::kernels::{I4_GROUP, Kernels, Matrix, WeightData, Weights};
+use crate::kernels::{Kernels, Matrix, Weights};
 
 /// One layer as a bundle holds it.
 #[derive(Debug, Clone, Copy)]
@@ -16,39 +16,14 @@ pub struct LayerWeights<'a> {
 
 impl LayerWeights<'_> {
     fn check(&self, what: &str, rows: usize, cols: usize) -> Result<()> {
-        let Weights { rows: r, cols: c, data } = self.weights;
-        let lengths = match data {
-            WeightData::F32(w) => w.len() == r * c,
-            WeightData::F16(w) => w.len() == r * c,
-            WeightData::I8 { q, scale } => q.len() == r * c && scale.len() == r,
-            WeightData::I4 { q, scale } => q.len() == r * c.div_ceil(2) && scale.len() == r * c.div_ceil(I4_GROUP),
-        };
-        if (r, c, self.bias.len()) == (rows, cols, rows) && lengths {
+        let Weights { rows: r, cols: c, .. } = self.weights;
+        if (r, c, self.bias.len()) == (rows, cols, rows) && self.weights.is_complete() {
             return Ok(());
         }
         Err(invalid(format!(
             "{what}: weights of {r} x {c} and {} biases where the config asks for {rows} x {cols} and {rows}",
             self.bias.len()
         )))
-    }
-
-    /// The weights as floats, row-major.
-    #[cfg_attr(not(feature = "tract"), allow(dead_code, reason = "only the tract backend computes with plain floats"))]
-    pub(super) fn to_f32(self) -> Vec<f32> {
-        let cols = self.weights.cols;
-        match self.weights.data {
-            WeightData::F32(w) => w.to_vec(),
-            WeightData::F16(w) => w.iter().map(|v| v.to_f32()).collect(),
-            WeightData::I8 { q, scale } => q.iter().enumerate().map(|(i, &v)| f32::from(v) * scale[i / cols]).collect(),
-            WeightData::I4 { q, scale } => (0..self.weights.rows * cols)
-                .map(|i| {
-                    let (row, col) = (i / cols, i % cols);
-                    let nibble = (q[row * cols.div_ceil(2) + col / 2] >> (4 * (col % 2))) & 15;
-                    let scale = scale[row * cols.div_ceil(I4_GROUP) + col / I4_GROUP].to_f32();
-                    (f32::from(nibble) - 8.0) * scale
-                })
-                .collect(),
-        }
     }
 }
 
@@ -71,10 +46,11 @@ impl AudioWeights {
         out: LayerWeights<'_>,
     ) -> Result<Self> {
         check_weights(config, layers, &out)?;
-        let layers = config.layers.iter().zip(layers);
+        let pack = |name: &str, l: &LayerWeights<'_>| kernels.pack(l.weights, Some(l.bias)).named(name);
+        let layers = config.layers.iter().zip(layers).enumerate();
         Ok(Self {
-            layers: layers.map(|(conv, l)| (*conv, kernels.pack(l.weights, Some(l.bias)))).collect(),
-            out: kernels.pack(out.weights, Some(out.bias)),
+            layers: layers.map(|(i, (conv, l))| (*conv, pack(&format!("audio.conv.{i}"), l))).collect(),
+            out: pack("audio.out", &out),
         })
     }
 

@@ -1,12 +1,12 @@
 //! The audio encoder's weights as a bundle holds them.
 
-use super::Tensors;
+use super::{StoredWeights, Tensors};
 use crate::audio::{AudioWeights, LayerWeights};
 use crate::config::AudioConfig;
 use crate::error::Result;
-use crate::kernels::{Kernels, WeightData, Weights};
+use crate::kernels::Kernels;
 
-/// Weights and biases of the audio encoder in plain f32; what both backends are made from.
+/// Weights and biases of the audio encoder in their scheme; what both backends are made from.
 #[derive(Debug)]
 pub struct AudioSource {
     layers: Vec<Plain>,
@@ -15,9 +15,7 @@ pub struct AudioSource {
 
 #[derive(Debug)]
 struct Plain {
-    rows: usize,
-    cols: usize,
-    weight: Vec<f32>,
+    weight: StoredWeights,
     bias: Vec<f32>,
 }
 
@@ -25,7 +23,7 @@ impl AudioSource {
     /// Reads `audio.conv.*` (`[outputs, kernel, inputs]`) and `audio.out` (`[features, last]`).
     ///
     /// # Errors
-    /// As [`Tensors::f32`].
+    /// As [`Tensors::weights`].
     pub fn load(t: &Tensors<'_>, config: &AudioConfig) -> Result<Self> {
         let conv = |(i, c): (usize, &crate::config::ConvConfig)| {
             Plain::load(t, &format!("audio.conv.{i}"), &[c.outputs, c.kernel, c.inputs])
@@ -61,16 +59,10 @@ impl AudioSource {
 
 impl Plain {
     fn load(t: &Tensors<'_>, name: &str, shape: &[usize]) -> Result<Self> {
-        Ok(Self {
-            rows: shape[0],
-            cols: shape[1..].iter().product(),
-            weight: t.f32(&format!("{name}.weight"), shape)?,
-            bias: t.f32(&format!("{name}.bias"), &shape[..1])?,
-        })
+        Ok(Self { weight: t.weights(name, shape[0], &shape[1..])?, bias: t.f32(&format!("{name}.bias"), &shape[..1])? })
     }
 
     fn borrow(&self) -> LayerWeights<'_> {
-        let weights = Weights { rows: self.rows, cols: self.cols, data: WeightData::F32(&self.weight) };
-        LayerWeights { weights, bias: &self.bias }
+        LayerWeights { weights: self.weight.borrow(), bias: &self.bias }
     }
 }

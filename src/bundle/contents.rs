@@ -3,6 +3,7 @@
 use super::BundleFile;
 use crate::config::Config;
 use crate::error::Result;
+use crate::kernels::Scheme;
 use serde::Serialize;
 use std::fmt;
 
@@ -11,18 +12,23 @@ use std::fmt;
 pub struct TensorInfo {
     /// Name.
     pub name: String,
-    /// Storage type, for example `f32` or `f16`.
+    /// Storage type: `f32` or `f16`, for quantised weights their scheme (`i8`, `i4`).
     pub dtype: String,
-    /// Shape, row-major.
+    /// Shape, row-major; two int4 weights count as one element.
     pub shape: Vec<usize>,
     /// Bytes in the file.
     pub bytes: usize,
 }
 
 impl TensorInfo {
-    /// Number of elements.
+    /// Number of parameters; the padding of int4 rows of odd length counts, scales of quantised weights do not.
     pub fn elements(&self) -> usize {
-        self.shape.iter().product()
+        let n = self.shape.iter().product();
+        match self.dtype.as_str() {
+            "i4" => 2 * n,
+            _ if self.name.ends_with(".scale") => 0,
+            _ => n,
+        }
     }
 }
 
@@ -75,6 +81,13 @@ impl fmt::Display for Contents {
             dtypes.dedup();
             let (elements, bytes) = part.iter().fold((0, 0), |(e, b), t| (e + t.elements(), b + t.bytes));
             writeln!(f, "  {title:<20} {:>8} {elements:>12} {bytes:>12}  {}", part.len(), dtypes.join(", "))?;
+        }
+        if let Some(q) = &c.quantisation {
+            let count = |scheme| q.tensors.values().filter(|s| **s == scheme).count();
+            let schemes = [Scheme::I4, Scheme::I8, Scheme::F16, Scheme::F32].map(|s| (s, count(s)));
+            let list: Vec<_> =
+                schemes.iter().filter(|(_, n)| *n > 0).map(|(s, n)| format!("{n} matrices {s}")).collect();
+            writeln!(f, "\n  quantised to {}: {}", q.scheme, list.join(", "))?;
         }
         let stack: Vec<_> = c.audio.layers.iter().map(|l| format!("{}/{}", l.outputs, l.stride)).collect();
         writeln!(

@@ -117,15 +117,23 @@ impl<'a> BundleFile<'a> {
             }
             Some(_) => {}
         }
+        let (json, tensors) = self.raw()?;
+        let config = parse_config(&json)?;
+        check::config(&config)?;
+        let quantisation = config.quantisation.clone();
+        Ok((config, Tensors::new(tensors, quantisation)))
+    }
+
+    /// The config as JSON and the container; neither has been looked into.
+    pub(crate) fn raw(&self) -> Result<(String, SafeTensors<'_>)> {
+        let bytes = self.as_slice();
         let container = |e| corrupt(format!("damaged safetensors container ({e}); fetch the bundle again"));
         let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(container)?;
         let tensors = SafeTensors::deserialize(bytes).map_err(container)?;
-        let json = metadata.metadata().as_ref().and_then(|m| m.get(CONFIG_KEY)).ok_or_else(|| {
+        let json = metadata.metadata().as_ref().and_then(|m| m.get(CONFIG_KEY).cloned()).ok_or_else(|| {
             invalid(format!("a safetensors file, but not a Visavis bundle: its metadata has no \"{CONFIG_KEY}\" entry"))
         })?;
-        let config = parse_config(json)?;
-        check::config(&config)?;
-        Ok((config, Tensors::new(tensors)))
+        Ok((json, tensors))
     }
 }
 

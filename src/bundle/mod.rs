@@ -7,11 +7,13 @@ mod audio;
 mod check;
 mod contents;
 mod file;
+mod stored;
 mod tensors;
 
 pub use audio::AudioSource;
 pub use contents::{Contents, TensorInfo};
 pub use file::BundleFile;
+pub use stored::{StoredData, StoredWeights};
 pub use tensors::Tensors;
 
 /// Key of the config in the safetensors metadata.

@@ -1,8 +1,10 @@
 //! Typed, checked access to the tensors of a bundle.
 
 use super::file::invalid;
+use super::{StoredData, StoredWeights};
+use crate::config::Quantisation;
 use crate::error::{Error, ErrorKind, Result};
-use crate::kernels::{Kernels, Matrix, WeightData, Weights};
+use crate::kernels::{I4_GROUP, Kernels, Matrix, Scheme};
 use half::f16;
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
@@ -14,20 +16,24 @@ use std::collections::HashSet;
 #[derive(Debug)]
 pub struct Tensors<'a> {
     container: SafeTensors<'a>,
+    quantisation: Option<Quantisation>,
     read: RefCell<HashSet<String>>,
 }
 
 impl<'a> Tensors<'a> {
-    pub(super) fn new(container: SafeTensors<'a>) -> Self {
-        Self { container, read: RefCell::default() }
+    pub(super) fn new(container: SafeTensors<'a>, quantisation: Option<Quantisation>) -> Self {
+        Self { container, quantisation, read: RefCell::default() }
     }
 
-    /// Names, dtypes, shapes and sizes, sorted by name.
+    /// Names, dtypes, shapes and sizes, sorted by name; the dtype of quantised weights is their scheme.
     pub fn infos(&self) -> Vec<super::TensorInfo> {
         let mut infos: Vec<_> = (self.container.iter())
             .map(|(name, view)| super::TensorInfo {
                 name: name.to_owned(),
-                dtype: format!("{:?}", view.dtype()).to_lowercase(),
+                dtype: match self.recorded(name) {
+                    Some(scheme) => scheme.to_string(),
+                    None => format!("{:?}", view.dtype()).to_lowercase(),
+                },
                 shape: view.shape().to_vec(),
                 bytes: view.data().len(),
             })
@@ -58,28 +64,69 @@ impl<'a> Tensors<'a> {
         }
     }
 
-    /// Reads `{name}.weight` (`[outputs, inputs]`; higher ranks are flattened after the first axis) and `{name}.bias`
-    /// and packs them for the kernels at hand.
+    /// Reads the weights `{name}.weight` (`[outputs, inputs]`; higher ranks are flattened after the first axis) in the scheme that the
+    /// config records, with `{name}.scale` where it has scales:
+    ///
+    /// | scheme | `{name}.weight` | `{name}.scale` |
+    /// |---|---|---|
+    /// | `f32`, `f16` | F32, F16 `[outputs, inputs]` | |
+    /// | `i8` | I8 `[outputs, inputs]` | F32 `[outputs]` |
+    /// | `i4` | U8 `[outputs, ceil(inputs / 2)]` | F16 `[outputs, ceil(inputs / 32)]` |
     ///
     /// # Errors
-    /// As [`Tensors::f32`].
-    pub fn linear(&self, kernels: Kernels, name: &str, outputs: usize, inputs: &[usize]) -> Result<Matrix> {
-        let mut shape = vec![outputs];
-        shape.extend_from_slice(inputs);
-        let weight = self.f32(&format!("{name}.weight"), &shape)?;
-        let bias = self.f32(&format!("{name}.bias"), &[outputs])?;
-        let weights = Weights { rows: outputs, cols: inputs.iter().product(), data: WeightData::F32(&weight) };
-        Ok(kernels.pack(weights, Some(&bias)))
+    /// As [`Tensors::f32`]; [`ErrorKind::BundleInvalid`] also when dtype and record disagree, [`ErrorKind::BundleCorrupt`] for a
+    /// scale that is not finite, or of int8 negative.
+    pub fn weights(&self, name: &str, outputs: usize, inputs: &[usize]) -> Result<StoredWeights> {
+        let (weight, scale) = (format!("{name}.weight"), format!("{name}.scale"));
+        let cols = inputs.iter().product::<usize>();
+        let shape = [&[outputs], inputs].concat();
+        let data = match self.recorded(&weight) {
+            None => self.plain(&weight, &shape)?,
+            Some(scheme @ (Scheme::F32 | Scheme::F16)) => {
+                let data = self.plain(&weight, &shape)?;
+                match (scheme, &data) {
+                    (Scheme::F32, StoredData::F32(_)) | (Scheme::F16, StoredData::F16(_)) => data,
+                    _ => return Err(disagree(&weight, scheme, self.view(&weight, None)?.dtype())),
+                }
+            }
+            Some(Scheme::I8) => StoredData::I8 {
+                q: self.bytes(&weight, &shape, Scheme::I8, Dtype::I8)?.iter().map(|&b| b as i8).collect(),
+                scale: positive(&scale, self.f32(&scale, &[outputs])?)?,
+            },
+            Some(Scheme::I4) => {
+                let q = self.bytes(&weight, &[outputs, cols.div_ceil(2)], Scheme::I4, Dtype::U8)?.to_vec();
+                let view = self.view(&scale, Some(&[outputs, cols.div_ceil(I4_GROUP)]))?;
+                if view.dtype() != Dtype::F16 {
+                    return Err(disagree(&scale, Scheme::F16, view.dtype()));
+                }
+                floats(&scale, &view)?;
+                StoredData::I4 { q, scale: halves(view.data()) }
+            }
+        };
+        Ok(StoredWeights { rows: outputs, cols, data })
     }
 
-    /// Fails if the bundle holds tensors that nothing has read.
+    /// Reads `{name}.weight` (as [`Tensors::weights`]) and `{name}.bias` and packs them for the kernels at hand.
+    ///
+    /// # Errors
+    /// As [`Tensors::weights`].
+    pub fn linear(&self, kernels: Kernels, name: &str, outputs: usize, inputs: &[usize]) -> Result<Matrix> {
+        let weights = self.weights(name, outputs, inputs)?;
+        let bias = self.f32(&format!("{name}.bias"), &[outputs])?;
+        Ok(kernels.pack(weights.borrow(), Some(&bias)).named(name))
+    }
+
+    /// Fails if the bundle holds, or its config records, tensors that nothing has read.
     ///
     /// # Errors
     /// [`ErrorKind::BundleInvalid`] naming the first of them.
     pub fn finish(&self) -> Result<()> {
         let read = self.read.borrow();
-        let mut unread: Vec<_> = self.container.names().into_iter().filter(|n| !read.contains(*n)).collect();
+        let recorded = self.quantisation.iter().flat_map(|q| q.tensors.keys().map(String::as_str));
+        let mut unread: Vec<_> =
+            self.container.names().into_iter().chain(recorded).filter(|n| !read.contains(*n)).collect();
         unread.sort_unstable();
+        unread.dedup();
         match unread.first() {
             None => Ok(()),
             Some(name) => Err(invalid(format!(
@@ -87,6 +134,22 @@ impl<'a> Tensors<'a> {
                 unread.len()
             ))),
         }
+    }
+
+    /// The scheme that the config records for a tensor.
+    fn recorded(&self, name: &str) -> Option<Scheme> {
+        self.quantisation.as_ref()?.tensors.get(name).copied()
+    }
+
+    fn plain(&self, name: &str, shape: &[usize]) -> Result<StoredData> {
+        let view = self.view(name, Some(shape))?;
+        let values = floats(name, &view)?;
+        Ok(if view.dtype() == Dtype::F16 { StoredData::F16(halves(view.data())) } else { StoredData::F32(values) })
+    }
+
+    fn bytes(&self, name: &str, shape: &[usize], scheme: Scheme, dtype: Dtype) -> Result<&'a [u8]> {
+        let view = self.view(name, Some(shape))?;
+        if view.dtype() == dtype { Ok(view.data()) } else { Err(disagree(name, scheme, view.dtype())) }
     }
 
     fn view(&self, name: &str, shape: Option<&[usize]>) -> Result<TensorView<'a>> {
@@ -103,12 +166,37 @@ impl<'a> Tensors<'a> {
     }
 }
 
+fn disagree(name: &str, scheme: Scheme, dtype: Dtype) -> Error {
+    invalid(format!("tensor {name} is {dtype:?}, but the config says {scheme}; quantise the original bundle again"))
+}
+
+fn positive(name: &str, scales: Vec<f32>) -> Result<Vec<f32>> {
+    match scales.iter().position(|s| *s < 0.0) {
+        None => Ok(scales),
+        Some(i) => Err(Error::new(
+            ErrorKind::BundleCorrupt,
+            format!(
+                "tensor {name} holds {} at element {i}, but scales are not negative; fetch the bundle again",
+                scales[i]
+            ),
+        )),
+    }
+}
+
+fn halves(data: &[u8]) -> Vec<f16> {
+    data.chunks_exact(2).map(|b| f16::from_le_bytes([b[0], b[1]])).collect()
+}
+
 fn floats(name: &str, view: &TensorView<'_>) -> Result<Vec<f32>> {
     let data = view.data();
     let values: Vec<f32> = match view.dtype() {
         Dtype::F32 => data.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect(),
-        Dtype::F16 => data.chunks_exact(2).map(|b| f16::from_le_bytes([b[0], b[1]]).to_f32()).collect(),
-        other => return Err(invalid(format!("tensor {name} is {other:?}; this build reads F32 and F16"))),
+        Dtype::F16 => halves(data).into_iter().map(f16::to_f32).collect(),
+        other => {
+            return Err(invalid(format!(
+                "tensor {name} is {other:?}, and the config records no scheme for it; this build reads F32 and F16 there"
+            )));
+        }
     };
     match values.iter().position(|v| !v.is_finite()) {
         None => Ok(values),

@@ -5,6 +5,8 @@ use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use visavis::engine::Engine;
 use visavis::frame::Sampler;
+use visavis::kernels::Scheme;
+use visavis::quant::Keep;
 use visavis::session::SessionOptions;
 
 /// A body for a virtual agent: hears both voices, sees the user's head, moves at 30 frames a second.
@@ -25,6 +27,8 @@ pub enum Command {
     Generate(GenerateArgs),
     /// Tells what a bundle holds: networks, sizes, rig, delays, licence
     Inspect(InspectArgs),
+    /// Quantises a bundle of floats to int8, int4 or half floats
+    Quantize(QuantizeArgs),
     /// Runs given conditioning and noise through a bundle and writes every stage
     Trace(TraceArgs),
 }
@@ -95,6 +99,25 @@ pub struct InspectArgs {
     /// Prints JSON: bytes, the whole config, every tensor
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct QuantizeArgs {
+    /// Bundle of floats
+    #[arg(value_name = "IN")]
+    pub input: PathBuf,
+    /// Where the quantised bundle goes
+    #[arg(value_name = "OUT")]
+    pub output: PathBuf,
+    /// f16, i8 or i4
+    #[arg(long, value_name = "SCHEME")]
+    pub scheme: Scheme,
+    /// Layers that stay floats, f16 unless told otherwise; `*` stands for any characters, the last pattern that fits decides
+    #[arg(long, value_name = "PATTERN[=f16|f32]")]
+    pub keep: Vec<Keep>,
+    /// Raises the layers that hurt most until blocks of the sample conversation are within this mean joint error, millimetres
+    #[arg(long, value_name = "BUDGET_MM", value_parser = millimetres, allow_negative_numbers = true)]
+    pub auto: Option<f64>,
 }
 
 #[derive(Debug, Args)]
@@ -177,6 +200,13 @@ fn gaze(text: &str) -> Result<Gaze, String> {
 
 fn weight(text: &str) -> Result<f32, String> {
     number(text, 0.0, 20.0)
+}
+
+fn millimetres(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if value > 0.0 && value <= 1000.0 => Ok(value),
+        _ => Err("it is a number above 0, up to 1000".to_owned()),
+    }
 }
 
 fn number(text: &str, low: f32, high: f32) -> Result<f32, String> {

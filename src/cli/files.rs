@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use visavis::error::{Error, ErrorKind, Result};
+use visavis::offline::Conversation;
 
 /// The shipped bundle.
 const MODEL: &str = "models/visavis-base.safetensors";
@@ -15,8 +16,14 @@ pub fn model(given: Option<&Path>) -> Result<PathBuf> {
 }
 
 /// A file of the sample conversation.
-pub fn sample(name: &str) -> Result<PathBuf> {
+fn sample(name: &str) -> Result<PathBuf> {
     shipped(&format!("samples/{name}")).map_err(|tried| missing("the sample conversation", &tried, ""))
+}
+
+/// The sample conversation.
+pub fn conversation() -> Result<Conversation> {
+    let [agent, user, path] = ["agent.wav", "user.wav", "user.csv"].map(sample);
+    Conversation::read(Some(&agent?), Some(&user?), Some(&path?))
 }
 
 /// Looks for `relative` in the current folder, beside the program, and where the program was built; else what was tried.

@@ -8,6 +8,7 @@ mod files;
 mod generate;
 mod inspect;
 mod progress;
+mod quantize;
 mod trace;
 
 use args::{Cli, Command, DemoArgs};
@@ -23,6 +24,7 @@ pub fn main() -> ExitCode {
             Command::Demo(args) => demo::run(&args),
             Command::Generate(args) => generate::run(&args),
             Command::Inspect(args) => inspect::run(&args),
+            Command::Quantize(args) => quantize::run(&args),
             Command::Trace(args) => trace::run(&args),
         },
         Err(e) => return usage(&e),

@@ -85,20 +85,19 @@ impl FlowNet {
         };
 
         let rest = c.embed_user + 2 * c.embed_voice + c.embed_gaze + 4;
-        let input = t.f32(&name("input.weight"), &[d, c.embed_latent + rest])?;
+        let stored = t.weights(&name("input"), d, &[c.embed_latent + rest])?;
+        let input = stored.to_f32();
         let input_bias = t.f32(&name("input.bias"), &[d])?;
-        let embed = t.f32(&name("embed_latent.weight"), &[c.embed_latent, latent])?;
+        let embed = t.weights(&name("embed_latent"), c.embed_latent, &[latent])?.to_f32();
         let embed_bias = t.f32(&name("embed_latent.bias"), &[c.embed_latent])?;
         let (folded, bias) = fold(&input, &input_bias, &embed, &embed_bias, latent);
-        let rest_weights: Vec<f32> =
-            input.chunks_exact(c.embed_latent + rest).flat_map(|row| &row[c.embed_latent..]).copied().collect();
-        let pack = |w: &[f32], cols, bias| kernels.pack(Weights { rows: d, cols, data: WeightData::F32(w) }, bias);
+        let folded = Weights { rows: d, cols: latent, data: WeightData::F32(&folded) };
         Ok(Self {
             config: *c,
             latent,
             layout,
-            input_latent: pack(&folded, latent, None),
-            input_rest: pack(&rest_weights, rest, Some(&bias)),
+            input_latent: kernels.pack(folded, None),
+            input_rest: stored.pack_columns(kernels, c.embed_latent.., Some(&bias)),
             unconditional: bias,
             embed_user: (linear("embed_user.0", c.embed_user, 8)?, linear("embed_user.2", c.embed_user, c.embed_user)?),
             embed_agent_voice: linear("embed_agent", c.embed_voice, 4 * layout.audio_features)?,
@@ -109,6 +108,23 @@ impl FlowNet {
             rope: Rope::new(d / c.heads),
             tau,
         })
+    }
+
+    /// Bytes of the packed matrices that one evaluation reads.
+    pub fn pass_bytes(&self) -> usize {
+        self.layers.iter().map(Layer::bytes).sum::<usize>() + self.input_latent.bytes() + self.out.bytes()
+    }
+
+    /// Bytes of the packed matrices that a block reads once, to embed its conditioning.
+    pub fn condition_bytes(&self) -> usize {
+        let embeds = [&self.embed_user.0, &self.embed_user.1, &self.embed_agent_voice, &self.embed_user_voice];
+        embeds.into_iter().chain([&self.embed_gaze, &self.input_rest]).map(Matrix::bytes).sum()
+    }
+
+    /// Bytes of the packed matrices that turn flow times into modulation, read when a session starts.
+    pub fn modulation_bytes(&self) -> usize {
+        let once = [&self.tau.first, &self.tau.second, &self.tau.last];
+        once.into_iter().chain(&self.tau.layers).map(Matrix::bytes).sum()
     }
 
     /// Sizes.

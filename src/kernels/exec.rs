@@ -1,6 +1,7 @@
 //! [`Exec`]: kernels, threads and scratch of one session; the one object that networks call.
 
 use super::Kernels;
+use super::activations::Activations;
 use super::attend::{Head, KvCache, Span};
 use super::linear::LINE;
 use super::packed::{Buffer, MAX_ROWS};
@@ -56,6 +57,7 @@ pub struct Exec {
     pub(super) wide: Buffer,
     pub(super) sums: Vec<i32>,
     flush: Option<FlushToZero>,
+    pub(super) activations: Option<Activations>,
 }
 
 /// A pointer that the pieces of one run share; each writes a part of its own.
@@ -97,6 +99,7 @@ impl Exec {
             wide: Buffer::new(2 * n),
             sums: vec![0; n / GROUP],
             flush: None,
+            activations: None,
         })
     }
 
@@ -113,6 +116,11 @@ impl Exec {
     /// The pool of threads.
     pub fn pool(&self) -> &Pool {
         &self.pool
+    }
+
+    /// Lets `activations` listen to the linear layers from here on (`None`: nobody) and returns what listened so far.
+    pub fn listen(&mut self, activations: Option<Activations>) -> Option<Activations> {
+        std::mem::replace(&mut self.activations, activations)
     }
 
     /// Starts a stretch of work: the helper wakes up and spins, and denormals count as zero on both threads. Calling it twice is harmless.

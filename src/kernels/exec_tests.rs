@@ -83,7 +83,10 @@ fn linear_matches_f64_and_has_the_same_bits_everywhere() {
                 let mut first: Option<Vec<u32>> = None;
                 for kernels in levels() {
                     let m = kernels.pack(Weights { rows: out, cols, data: layer.data(scheme) }, Some(&bias));
-                    assert_eq!((m.out_features(), m.in_features(), m.scheme()), (out, cols, scheme));
+                    assert_eq!(
+                        (m.out_features(), m.in_features(), m.scheme().to_string().as_str()),
+                        (out, cols, scheme)
+                    );
                     for threads in [1, 2] {
                         let mut exec = Exec::new(kernels, threads, Limits { rows, width: cols }).unwrap();
                         let mut y = y0.clone();

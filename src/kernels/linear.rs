@@ -26,6 +26,9 @@ impl Exec {
         assert_eq!(x.len(), rows * w.cols, "linear: x is rows x in_features");
         assert_eq!(y.len(), rows * w.out, "linear: y is rows x out_features");
         assert!(w.cols <= self.width, "linear: in_features within Limits::width");
+        if let Some(activations) = &mut self.activations {
+            activations.listen(&w.name, x, w.cols);
+        }
         for start in (0..rows).step_by(MAX_ROWS) {
             let n = MAX_ROWS.min(rows - start);
             let x = &x[start * w.cols..][..n * w.cols];

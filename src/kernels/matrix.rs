@@ -3,48 +3,13 @@
 use half::f16;
 
 use super::packed::{Buffer, FloatGeometry, NR};
-use super::quantize_rows::GROUP;
+use super::weights::{Scheme, WeightData, Weights};
 use super::{Kernels, Variant, matmul_f32_f16, matmul_f32_f32, matmul_i8dx_i4g, matmul_i8dx_i8cx};
-
-/// Columns that share a scale in int4 weights.
-pub const I4_GROUP: usize = GROUP;
-
-/// Weights of a linear layer as a bundle holds them: row-major, `rows` outputs x `cols` inputs.
-#[derive(Debug, Clone, Copy)]
-pub struct Weights<'a> {
-    /// Output features.
-    pub rows: usize,
-    /// Input features.
-    pub cols: usize,
-    /// The values and their scheme.
-    pub data: WeightData<'a>,
-}
-
-/// Values of a weight matrix in one of the four schemes.
-#[derive(Debug, Clone, Copy)]
-pub enum WeightData<'a> {
-    /// `rows * cols` floats.
-    F32(&'a [f32]),
-    /// `rows * cols` half floats; products and sums are in f32.
-    F16(&'a [f16]),
-    /// Symmetric int8: weight = `q[r][c] * scale[r]`; activations are quantised to int8 per row.
-    I8 {
-        /// `rows * cols` values.
-        q: &'a [i8],
-        /// One scale a row.
-        scale: &'a [f32],
-    },
-    /// Group-wise int4: weight = `(n - 8) * scale[r][c / 32]`, n in 0..=15; activations are quantised to int8 per row.
-    I4 {
-        /// `rows * ceil(cols / 2)` bytes: column 2i in the low nibble of byte i of its row, 2i + 1 in the high one.
-        q: &'a [u8],
-        /// `rows * ceil(cols / 32)` scales.
-        scale: &'a [f16],
-    },
-}
 
 /// A linear layer packed for one CPU level: weights, scales and bias.
 pub struct Matrix {
+    /// What [`Activations`](super::Activations) know it by; empty for none.
+    pub(super) name: String,
     pub(super) out: usize,
     pub(super) cols: usize,
     /// Padded with zeros to whole panels, as are the scales.
@@ -99,7 +64,14 @@ impl Matrix {
                 Body::I4(pack_nibbles(q, scale, rows, cols, panels), matmul_i8dx_i4g::Geometry::new(cols), kernels.i4)
             }
         };
-        Matrix { out: rows, cols, bias, body }
+        Matrix { name: String::new(), out: rows, cols, bias, body }
+    }
+
+    /// The same matrix with a name for [`Activations`](super::Activations).
+    #[must_use]
+    pub fn named(mut self, name: &str) -> Self {
+        name.clone_into(&mut self.name);
+        self
     }
 
     /// Length of a row of results.
@@ -121,13 +93,13 @@ impl Matrix {
             }
     }
 
-    /// Scheme of the weights: `f32`, `f16`, `i8` or `i4`.
-    pub fn scheme(&self) -> &'static str {
+    /// Scheme of the weights.
+    pub fn scheme(&self) -> Scheme {
         match &self.body {
-            Body::F32(..) => "f32",
-            Body::F16(..) => "f16",
-            Body::I8(..) => "i8",
-            Body::I4(..) => "i4",
+            Body::F32(..) => Scheme::F32,
+            Body::F16(..) => Scheme::F16,
+            Body::I8(..) => Scheme::I8,
+            Body::I4(..) => Scheme::I4,
         }
     }
 }

@@ -16,6 +16,7 @@
 
 #![allow(clippy::needless_range_loop, reason = "tiles are indexed by row, panel and lane side by side")]
 
+mod activations;
 mod attend;
 mod epilogue;
 mod exec;
@@ -37,12 +38,15 @@ mod quantize_rows;
 mod rope;
 #[cfg(test)]
 mod testing;
+mod weights;
 
+pub use activations::Activations;
 pub use attend::{KvCache, KvDtype, Span};
 pub use exec::{Exec, Limits, RowTable};
 pub use level::Level;
 pub use linear::Epilogue;
-pub use matrix::{I4_GROUP, Matrix, WeightData, Weights};
+pub use matrix::Matrix;
+pub use weights::{I4_GROUP, Scheme, WeightData, Weights};
 
 use crate::error::{Error, ErrorKind, Result};
 

@@ -105,6 +105,11 @@ impl Scratch {
 }
 
 impl Layer {
+    /// Bytes of the packed matrices.
+    pub fn bytes(&self) -> usize {
+        [&self.qkv, &self.proj, &self.fc1, &self.fc2].into_iter().map(Matrix::bytes).sum()
+    }
+
     /// Runs layer number `index` over `x` (`rows x d`, in place): writes the rows' keys and values to `cache`, then
     /// attends over each row's span.
     #[allow(clippy::too_many_arguments, reason = "a layer's pass needs all of them, and they have no natural owner")]

@@ -42,6 +42,11 @@ impl Decoder {
         })
     }
 
+    /// Bytes of the packed matrices, all of which a block reads.
+    pub fn bytes(&self) -> usize {
+        self.stack.bytes() + self.latent.bytes() + self.out.bytes()
+    }
+
     /// Fresh state.
     pub fn state(&self, dtype: KvDtype) -> DecoderState {
         DecoderState(self.stack.state(dtype))
@@ -61,6 +66,14 @@ impl DecoderState {
     /// Forgets the past.
     pub fn reset(&mut self) {
         self.0.reset();
+    }
+
+    /// Takes back the last block, so that the next one takes its place (teacher-forced comparisons).
+    ///
+    /// # Panics
+    /// When there is none.
+    pub fn back(&mut self) {
+        self.0.back();
     }
 
     /// Bytes of the ring cache.

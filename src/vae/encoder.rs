@@ -46,6 +46,11 @@ impl Encoder {
         })
     }
 
+    /// Bytes of the packed matrices, all of which a block reads.
+    pub fn bytes(&self) -> usize {
+        self.stack.bytes() + self.frame.bytes() + self.mu.bytes()
+    }
+
     /// Fresh state.
     pub fn state(&self, dtype: KvDtype) -> EncoderState {
         EncoderState(self.stack.state(dtype))

@@ -61,6 +61,11 @@ impl Stack {
         })
     }
 
+    /// Bytes of the packed matrices.
+    pub(super) fn bytes(&self) -> usize {
+        self.layers.iter().map(|(layer, _)| layer.bytes()).sum()
+    }
+
     /// Fresh state; all memory that streaming needs is taken here.
     pub(super) fn state(&self, dtype: KvDtype) -> StackState {
         let (n, d) = (self.tokens, self.config.width);
@@ -133,6 +138,11 @@ impl StackState {
     /// Forgets everything: the next block starts a new sequence.
     pub(super) fn reset(&mut self) {
         self.block = 0;
+    }
+
+    /// Takes back the last block: the next one is written over it.
+    pub(super) fn back(&mut self) {
+        self.block -= 1;
     }
 
     /// Bytes of the ring cache.

@@ -2,11 +2,15 @@
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
 use glam::Vec3;
+use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 use std::path::PathBuf;
 use std::sync::Arc;
+use visavis::bundle::BundleFile;
 use visavis::engine::Engine;
 use visavis::frame::{BLOCK_FRAMES, FPS, Frame};
+use visavis::kernels::Scheme;
+use visavis::quant::{Options, quantise};
 use visavis::session::{Session, SessionOptions};
 
 /// A file of `tests/goldens`.
@@ -17,6 +21,34 @@ pub fn golden_path(name: &str) -> PathBuf {
 /// The tiny bundle: the real networks with few channels and random weights.
 pub fn tiny() -> Arc<Engine> {
     Engine::load(golden_path("tiny.safetensors")).expect("the tiny bundle loads")
+}
+
+/// The tiny bundle in f32, with weights that f16 does not hold.
+pub fn tiny_f32() -> BundleFile {
+    let bytes = std::fs::read(golden_path("tiny.safetensors")).expect("the tiny bundle is there");
+    let (_, header) = SafeTensors::read_metadata(&bytes).expect("a header");
+    let file = SafeTensors::deserialize(&bytes).expect("a sound container");
+    let widen = |view: &TensorView<'_>| -> Vec<u8> {
+        if view.dtype() == Dtype::F32 {
+            return view.data().to_vec();
+        }
+        let halves = view.data().chunks_exact(2).map(|b| half::f16::from_le_bytes([b[0], b[1]]).to_f32());
+        halves.flat_map(|v| (v * 1.0001).to_le_bytes()).collect()
+    };
+    let wide: Vec<_> = file.iter().map(|(name, view)| (name.to_owned(), view.shape().to_vec(), widen(&view))).collect();
+    let views = wide.iter().map(|(name, shape, data)| {
+        (name.as_str(), TensorView::new(Dtype::F32, shape.clone(), data).expect("a sound tensor"))
+    });
+    let bytes = safetensors::serialize(views, header.metadata().clone()).expect("a bundle");
+    BundleFile::from_bytes(bytes, "tiny f32")
+}
+
+/// The tiny bundle with all matrices at `scheme` that can be.
+pub fn tiny_in(scheme: Scheme) -> Arc<Engine> {
+    let file = tiny_f32();
+    let options = Options { scheme, smallest: 0, keep: &[], budget: None };
+    let quantised = quantise(&file, &options).expect("it can be quantised");
+    Engine::from_bytes(quantised.bytes, "tiny").expect("the result loads")
 }
 
 /// What PyTorch computed from the tiny bundle (`training/visavis_train/goldens.py`).
@@ -115,7 +147,12 @@ pub fn poll_blocks(session: &mut Session, blocks: usize) -> Vec<Frame> {
 
 /// A session of the tiny engine over `inputs`.
 pub fn motion(options: SessionOptions, inputs: &Inputs, blocks: usize) -> Vec<Frame> {
-    run(&mut tiny().session(options).expect("session"), inputs, blocks)
+    motion_of(&tiny(), options, inputs, blocks)
+}
+
+/// A session of `engine` over `inputs`.
+pub fn motion_of(engine: &Arc<Engine>, options: SessionOptions, inputs: &Inputs, blocks: usize) -> Vec<Frame> {
+    run(&mut engine.session(options).expect("session"), inputs, blocks)
 }
 
 /// Seconds of `blocks` blocks.

@@ -1,0 +1,57 @@
+//! The weight matrices of a bundle.
+
+use crate::bundle::{StoredWeights, Tensors};
+use crate::error::Result;
+use crate::kernels::Scheme;
+
+/// A layer with a weight matrix.
+#[derive(Debug, Clone)]
+pub struct Layer {
+    /// Name, without the `.weight` of its tensor.
+    pub name: String,
+    /// Shape of the tensor of floats.
+    pub shape: Vec<usize>,
+    /// The weights.
+    pub weights: StoredWeights,
+}
+
+impl Layer {
+    /// Number of weights.
+    pub fn elements(&self) -> usize {
+        self.weights.rows * self.weights.cols
+    }
+}
+
+/// The layers of an unquantised bundle, by name: every `*.weight` of two or more dimensions.
+///
+/// # Errors
+/// As [`Tensors::weights`].
+pub fn layers(tensors: &Tensors<'_>) -> Result<Vec<Layer>> {
+    let infos = tensors.infos().into_iter().filter(|t| t.shape.len() >= 2);
+    let named = infos.filter_map(|t| Some((t.name.strip_suffix(".weight")?.to_owned(), t.shape)));
+    named
+        .map(|(name, shape)| {
+            let weights = tensors.weights(&name, shape[0], &shape[1..])?;
+            Ok(Layer { name, shape, weights })
+        })
+        .collect()
+}
+
+/// Matrices with fewer weights than this stay as they are, if nothing else is asked for: together they are less than a hundredth of a bundle.
+pub const SMALL: usize = 8192;
+
+/// The scheme that layer `name` gets when `scheme` is asked for, if it is large enough to be quantised at all.
+///
+/// - The flow's input projection and its latent embedding are multiplied with each other when a bundle is loaded: f16 at most.
+/// - The audio encoder is f16 in an int8 bundle, and int8 in an int4 bundle: its features condition everything that follows.
+/// - Modulation weights turn into tables when a session starts and are not read in a block; a table's error does not average out over
+///   blocks, so they are int8 at least.
+pub fn default_scheme(name: &str, scheme: Scheme) -> Scheme {
+    let folded = name.ends_with(".input") || name.ends_with(".embed_latent");
+    match scheme {
+        Scheme::I8 | Scheme::I4 if folded => Scheme::F16,
+        Scheme::I8 if name.starts_with("audio.") => Scheme::F16,
+        Scheme::I4 if name.starts_with("audio.") || name.ends_with(".mod") || name.contains(".tau.") => Scheme::I8,
+        other => other,
+    }
+}

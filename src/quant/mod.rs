@@ -1,0 +1,106 @@
+//! The quantiser: a bundle of floats in, the same bundle with int8, int4 or half-float weights out.
+//!
+//! | file | what |
+//! |---|---|
+//! | `layers` | the weight matrices of a bundle, and which of them are worth quantising |
+//! | `keep` | patterns of layer names that stay floats |
+//! | `round` | rounding to each scheme, with the scale that loses least |
+//! | `teacher` | what quantisation does to a block: teacher-forced runs of two engines side by side |
+//! | `auto` | the scheme of each layer by measured sensitivity |
+//! | `write` | putting the bundle together |
+//!
+//! Weights are quantised one layer at a time: int8 symmetric per output channel, int4 symmetric in groups of 32 columns with an f16
+//! scale. Activations are quantised when they come, per row, so nothing about them is stored. Biases, norms, embeddings of tokens and
+//! statistics stay as they are. The result depends on the input bundle and the options alone, bit for bit.
+
+mod auto;
+mod keep;
+mod layers;
+mod round;
+mod teacher;
+#[cfg(test)]
+mod tests;
+mod write;
+
+pub use auto::{Budget, Choice};
+pub use keep::Keep;
+pub use layers::{Layer, SMALL, default_scheme, layers};
+pub use round::{round, sqnr_db};
+pub use teacher::{Forced, FrameError, Scene, Teacher};
+
+use crate::bundle::{BundleFile, Tensors};
+use crate::config::{Config, Quantisation};
+use crate::error::{Error, ErrorKind, Result};
+use crate::kernels::Scheme;
+use std::collections::BTreeMap;
+
+/// What to do with the weights.
+#[derive(Debug)]
+pub struct Options<'a> {
+    /// Scheme of every layer that nothing else is said about: `f16`, `i8` or `i4`.
+    pub scheme: Scheme,
+    /// Matrices with fewer weights stay as they are; [`SMALL`] unless there is a reason.
+    pub smallest: usize,
+    /// Layers that stay floats; the last pattern that fits a layer decides.
+    pub keep: &'a [Keep],
+    /// Raises layers to better schemes until blocks are within a budget of error.
+    pub budget: Option<&'a Budget<'a>>,
+}
+
+/// A quantised bundle.
+#[derive(Debug)]
+pub struct Quantised {
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// Scheme of each layer.
+    pub schemes: BTreeMap<String, Scheme>,
+    /// Of a run with a budget: what was tried.
+    pub choice: Option<Choice>,
+}
+
+/// Quantises the weights of `file`.
+///
+/// # Errors
+/// Those of loading the bundle; [`ErrorKind::Argument`] when it is quantised already, when a pattern fits no layer, or when a weight
+/// is beyond the range of f16.
+pub fn quantise(file: &BundleFile, options: &Options<'_>) -> Result<Quantised> {
+    let (config, tensors) = file.parse()?;
+    refuse_twice(&config, &tensors, options.scheme).map_err(|e| e.with_path(file.path()))?;
+    // Everything that loading checks holds from here on.
+    let reference = crate::engine::Engine::from_file(file, crate::kernels::Kernels::detect()?)?;
+    let layers = layers(&tensors)?;
+    let schemes = keep::apply(options, &layers)?;
+    let (schemes, choice) = match options.budget {
+        None => (schemes, None),
+        Some(budget) => {
+            let (schemes, choice) = auto::choose(file, &reference, &layers, schemes, options.keep, budget)?;
+            (schemes, Some(choice))
+        }
+    };
+    let bytes = write::bundle(file, &layers, &schemes, options.scheme)?;
+    Ok(Quantised { bytes, schemes, choice })
+}
+
+/// Errors of quantising add up; what is quantised is to be quantised anew from the original.
+fn refuse_twice(config: &Config, tensors: &Tensors<'_>, scheme: Scheme) -> Result<()> {
+    let already = match &config.quantisation {
+        Some(Quantisation { scheme: Scheme::I8 | Scheme::I4, .. }) => true,
+        Some(Quantisation { scheme: Scheme::F16, .. }) => scheme == Scheme::F16,
+        _ => {
+            let mut weights = layers(tensors)?.into_iter();
+            scheme == Scheme::F16 && weights.all(|layer| layer.weights.scheme() == Scheme::F16)
+        }
+    };
+    let is = config.quantisation.as_ref().map_or(Scheme::F16, |q| q.scheme);
+    if scheme == Scheme::F32 {
+        return Err(argument("quantising to f32 makes no sense: choose f16, i8 or i4".to_owned()));
+    }
+    if already {
+        return Err(argument(format!("it is quantised already, to {is}; quantise the bundle that it was made from")));
+    }
+    Ok(())
+}
+
+fn argument(message: String) -> Error {
+    Error::new(ErrorKind::Argument, message)
+}

@@ -1,0 +1,74 @@
+//! Putting a quantised bundle together.
+
+use super::layers::Layer;
+use super::round::round;
+use crate::bundle::{BundleFile, CONFIG_KEY, StoredData, StoredWeights};
+use crate::config::Quantisation;
+use crate::error::{Error, ErrorKind, Result};
+use crate::kernels::{I4_GROUP, Scheme};
+use safetensors::Dtype;
+use safetensors::tensor::TensorView;
+use std::collections::{BTreeMap, HashMap};
+
+type Entry = (String, Dtype, Vec<usize>, Vec<u8>);
+
+/// The bundle of `file` with its `layers` rounded to `schemes`; every other tensor stays as it is.
+pub(super) fn bundle(
+    file: &BundleFile,
+    layers: &[Layer],
+    schemes: &BTreeMap<String, Scheme>,
+    asked: Scheme,
+) -> Result<Vec<u8>> {
+    let rounded: Result<Vec<_>> = (layers.iter())
+        .map(|layer| {
+            let scheme = schemes.get(&layer.name).copied().unwrap_or(Scheme::F32).min(layer.weights.scheme());
+            let w = &layer.weights;
+            let stored = if scheme == w.scheme() { w.clone() } else { round(&w.to_f32(), w.rows, w.cols, scheme)? };
+            Ok((layer, stored))
+        })
+        .collect();
+    assemble(file, &rounded?, asked)
+}
+
+/// Puts weights in the place of those of `file` and records their schemes in its config.
+pub(super) fn assemble(file: &BundleFile, weights: &[(&Layer, StoredWeights)], asked: Scheme) -> Result<Vec<u8>> {
+    let (json, tensors) = file.raw()?;
+    let mut entries: Vec<Entry> = Vec::new();
+    let mut record = Quantisation { scheme: asked, tensors: BTreeMap::new() };
+    for (layer, stored) in weights {
+        record.tensors.insert(format!("{}.weight", layer.name), stored.scheme());
+        store(layer, stored, &mut entries);
+    }
+    let kept = tensors.iter().filter(|(name, _)| !record.tensors.contains_key(*name));
+    entries.extend(kept.map(|(n, v)| (n.to_owned(), v.dtype(), v.shape().to_vec(), v.data().to_vec())));
+
+    let failed = |what: String| Error::new(ErrorKind::BundleInvalid, format!("cannot be written anew: {what}"));
+    let mut config: serde_json::Value = serde_json::from_str(&json).map_err(|e| failed(e.to_string()))?;
+    config["quantisation"] = serde_json::to_value(&record).map_err(|e| failed(e.to_string()))?;
+    let views = (entries.iter())
+        .map(|(name, dtype, shape, data)| Ok((name.as_str(), TensorView::new(*dtype, shape.clone(), data)?)))
+        .collect::<std::result::Result<Vec<_>, safetensors::SafeTensorError>>()
+        .map_err(|e| failed(e.to_string()))?;
+    // One entry of metadata: a map of more would be written in no fixed order.
+    let metadata = HashMap::from([(CONFIG_KEY.to_owned(), config.to_string())]);
+    safetensors::serialize(views, Some(metadata)).map_err(|e| failed(e.to_string()))
+}
+
+fn store(layer: &Layer, weights: &StoredWeights, entries: &mut Vec<Entry>) {
+    let (weight, scale) = (format!("{}.weight", layer.name), format!("{}.scale", layer.name));
+    let floats = |w: &[f32]| w.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>();
+    let halves = |w: &[half::f16]| w.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>();
+    let shape = layer.shape.clone();
+    match &weights.data {
+        StoredData::F32(w) => entries.push((weight, Dtype::F32, shape, floats(w))),
+        StoredData::F16(w) => entries.push((weight, Dtype::F16, shape, halves(w))),
+        StoredData::I8 { q, scale: s } => {
+            entries.push((weight, Dtype::I8, shape, q.iter().map(|&v| v as u8).collect()));
+            entries.push((scale, Dtype::F32, vec![weights.rows], floats(s)));
+        }
+        StoredData::I4 { q, scale: s } => {
+            entries.push((weight, Dtype::U8, vec![weights.rows, weights.cols.div_ceil(2)], q.clone()));
+            entries.push((scale, Dtype::F16, vec![weights.rows, weights.cols.div_ceil(I4_GROUP)], halves(s)));
+        }
+    }
+}

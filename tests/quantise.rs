@@ -1,0 +1,201 @@
+//! Quantised bundles: made alike every time, loaded with checks, and close to what they were made from.
+
+#[cfg(feature = "cli")]
+#[path = "common/cli.rs"]
+mod cli;
+mod common;
+
+use common::{Inputs, golden_path, motion_of, tiny_f32, tiny_in};
+use visavis::bundle::{BundleFile, Contents};
+use visavis::engine::Engine;
+use visavis::error::ErrorKind;
+use visavis::frame::Sampler;
+use visavis::kernels::{Kernels, Scheme};
+use visavis::offline::Conversation;
+use visavis::quant::{Budget, Keep, Options, Scene, Teacher, quantise};
+use visavis::session::SessionOptions;
+use visavis::user::UserPath;
+
+fn options(scheme: Scheme, keep: &[Keep]) -> Options<'_> {
+    Options { scheme, smallest: 0, keep, budget: None }
+}
+
+fn scene(blocks: usize) -> Scene {
+    let inputs = Inputs::circling(4.0, 24_000);
+    let rows: String = inputs.path.iter().map(|(t, p)| format!("{t},{},{},{}\n", p.x, p.y, p.z)).collect();
+    let path = UserPath::parse(&format!("t,x,y,z\n{rows}")).unwrap();
+    Scene::new(&Conversation::new(Some(inputs.agent), Some(inputs.user), Some(path)).unwrap(), blocks, Some(0.5))
+        .unwrap()
+}
+
+#[test]
+fn the_same_input_gives_the_same_bytes() {
+    for scheme in [Scheme::F16, Scheme::I8, Scheme::I4] {
+        let once = quantise(&tiny_f32(), &options(scheme, &[])).unwrap().bytes;
+        assert_eq!(once, quantise(&tiny_f32(), &options(scheme, &[])).unwrap().bytes, "{scheme}");
+    }
+}
+
+#[test]
+fn blocks_stay_close_in_the_order_of_the_schemes() {
+    let reference = Engine::from_file(&tiny_f32(), Kernels::detect().unwrap()).unwrap();
+    for sampler in [Sampler::Midpoint(4), Sampler::Single] {
+        let teacher = Teacher::new(&reference, scene(12), sampler, 1, &mut None).unwrap();
+        let same = teacher.compare(&reference).unwrap();
+        assert_eq!((same.mean_mm(), same.round_trip_mm()), (0.0, 0.0), "nothing differs from itself");
+        let mm = |scheme| {
+            let forced = teacher.compare(&tiny_in(scheme)).unwrap();
+            assert_eq!(forced.frames.len(), 48);
+            (forced.mean_mm(), forced.round_trip_mm())
+        };
+        let (f16, i8, i4) = (mm(Scheme::F16), mm(Scheme::I8), mm(Scheme::I4));
+        println!("{sampler}: mm of a block, and through the VAE: f16 {f16:?}, i8 {i8:?}, i4 {i4:?}");
+        assert!(0.0 < f16.0 && f16.0 < i8.0 && i8.0 < i4.0, "{f16:?} {i8:?} {i4:?}");
+        assert!(f16.1 < i8.1 && i8.1 < i4.1, "{f16:?} {i8:?} {i4:?}");
+    }
+}
+
+#[test]
+fn sessions_have_the_same_bits_on_every_level_and_with_two_threads() {
+    for scheme in [Scheme::F16, Scheme::I8, Scheme::I4] {
+        let bytes = quantise(&tiny_f32(), &options(scheme, &[])).unwrap().bytes;
+        let inputs = Inputs::circling(2.0, 24_000);
+        let run = |level, threads| {
+            let file = BundleFile::from_bytes(bytes.clone(), "tiny");
+            let engine = Engine::from_file(&file, Kernels::with_level(level).unwrap()).unwrap();
+            motion_of(&engine, SessionOptions { threads, ..Default::default() }, &inputs, 8)
+        };
+        let levels = Kernels::available();
+        let first = run(levels[0], 1);
+        for level in levels {
+            assert!(run(level, 2) == first, "{scheme} at {level}");
+        }
+    }
+}
+
+#[test]
+fn quantising_twice_is_refused() {
+    for (first, second) in
+        [(Scheme::I8, Scheme::I8), (Scheme::I8, Scheme::F16), (Scheme::I4, Scheme::I8), (Scheme::F16, Scheme::F16)]
+    {
+        let bytes = quantise(&tiny_f32(), &options(first, &[])).unwrap().bytes;
+        let e = quantise(&BundleFile::from_bytes(bytes, "once"), &options(second, &[])).unwrap_err();
+        assert!(e.kind() == ErrorKind::Argument && e.to_string().starts_with("once: it is quantised"), "{e}");
+    }
+    let e =
+        quantise(&BundleFile::open(golden_path("tiny.safetensors")).unwrap(), &options(Scheme::F16, &[])).unwrap_err();
+    assert!(e.to_string().contains("already, to f16"), "{e}");
+    let halves = quantise(&tiny_f32(), &options(Scheme::F16, &[])).unwrap().bytes;
+    quantise(&BundleFile::from_bytes(halves, "halves"), &options(Scheme::I8, &[])).expect("f16 is a fine start");
+}
+
+/// Damage that only quantised bundles can have.
+#[test]
+fn damaged_schemes_are_typed_errors() {
+    let damaged = |scheme, from: &str, to: &str| {
+        let mut bytes = quantise(&tiny_f32(), &options(scheme, &[])).unwrap().bytes;
+        assert_eq!(from.len(), to.len(), "the header keeps its length");
+        let header = 8 + u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+        let at = bytes[..header].windows(from.len()).position(|w| w == from.as_bytes()).expect("it is in the header");
+        bytes[at..at + from.len()].copy_from_slice(to.as_bytes());
+        Engine::from_bytes(bytes, "damaged").map(|_| ()).unwrap_err()
+    };
+    let invalid = ErrorKind::BundleInvalid;
+    let q = |name: &str, scheme: &str| format!("\\\"{name}\\\":\\\"{scheme}\\\"");
+    for (from, to) in [
+        (q("vae.decoder.out.weight", "i8"), q("vae.decoder.out.weight", "i4")),
+        (q("vae.decoder.out.weight", "i8"), q("vae.decoder.0ut.weight", "i8")),
+        ("\"vae.decoder.out.scale\"".to_owned(), "\"vae.decoder.out.skale\"".to_owned()),
+        (q("vae.decoder.out.weight", "i8"), q("vae.decoder.out.weight", "i9")),
+    ] {
+        let e = damaged(Scheme::I8, &from, &to);
+        assert!(e.kind() == invalid && e.to_string().starts_with("damaged: "), "{to}: {e}");
+    }
+    let e = damaged(Scheme::I4, &q("flow.layers.0.qkv.weight", "i4"), &q("flow.layers.0.qkv.weight", "i8"));
+    assert!(e.kind() == invalid && e.to_string().contains("shape"), "{e}");
+}
+
+/// A flipped bit of a value makes another value; of a scale perhaps one that is refused, and nothing worse.
+#[test]
+fn flipped_bits_are_errors_or_harmless() {
+    for scheme in [Scheme::I8, Scheme::I4] {
+        let bytes = quantise(&tiny_f32(), &options(scheme, &[])).unwrap().bytes;
+        let header = 8 + u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+        for at in (header + 3..bytes.len()).step_by(bytes.len() / 150) {
+            let mut bytes = bytes.clone();
+            bytes[at] ^= 0x80;
+            match Engine::from_bytes(bytes, "flipped") {
+                Err(e) => assert!(e.kind() == ErrorKind::BundleCorrupt || e.kind() == ErrorKind::BundleInvalid, "{e}"),
+                Ok(engine) => {
+                    let mut session = engine.session(SessionOptions::default()).unwrap();
+                    let frames = session.poll(0.0);
+                    assert!(frames.is_err() || frames.is_ok_and(|f| f.unwrap()[3].global[0].position.is_finite()));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn kept_layers_stay_floats_and_inspect_tells() {
+    let keep: Vec<Keep> = ["flow.layers.*", "*.qkv=f32"].iter().map(|k| k.parse().unwrap()).collect();
+    let quantised = quantise(&tiny_f32(), &options(Scheme::I8, &keep)).unwrap();
+    let scheme = |name: &str| quantised.schemes[name];
+    assert_eq!(scheme("flow.layers.0.fc1"), Scheme::F16);
+    assert_eq!(scheme("flow.layers.0.qkv"), Scheme::F32, "the last pattern decides");
+    assert_eq!(scheme("student.layers.0.fc1"), Scheme::I8);
+    let file = BundleFile::from_bytes(quantised.bytes.clone(), "kept");
+    Engine::from_file(&file, Kernels::detect().unwrap()).unwrap();
+    let contents = Contents::of(&file).unwrap();
+    let dtype = |name: &str| contents.tensors.iter().find(|t| t.name == name).unwrap().dtype.clone();
+    assert_eq!([dtype("flow.layers.0.fc1.weight"), dtype("student.layers.0.fc1.weight")], ["f16", "i8"]);
+    assert!(contents.to_string().contains("quantised to i8"), "{contents}");
+    let e = quantise(&tiny_f32(), &options(Scheme::I8, &["nobody.*".parse().unwrap()])).unwrap_err();
+    assert!(e.kind() == ErrorKind::Argument && e.to_string().contains("nobody.*"), "{e}");
+}
+
+#[test]
+fn a_budget_raises_layers_until_blocks_are_within_it() {
+    let budget = |mm| Budget { mm, scene: scene(3), progress: &|_| {} };
+    let run = |mm| {
+        let budget = budget(mm);
+        quantise(&tiny_f32(), &Options { budget: Some(&budget), ..options(Scheme::I4, &[]) }).unwrap()
+    };
+    let free = run(1000.0);
+    let before = free.choice.as_ref().unwrap().before_mm;
+    assert!(free.choice.unwrap().raised.is_empty() && before > 0.0);
+    let half = run(before / 2.0);
+    let choice = half.choice.unwrap();
+    assert!(choice.after_mm <= before / 2.0 && !choice.raised.is_empty(), "{choice:?}");
+    assert!(half.bytes.len() > free.bytes.len());
+    // A budget that cannot be met ends with everything at f16.
+    let none = run(1e-9);
+    assert!(none.choice.unwrap().after_mm > 1e-9);
+    assert!(
+        none.schemes.iter().all(|(name, s)| *s == Scheme::F16 || name == "vae.encoder.logvar"),
+        "{:?}",
+        none.schemes
+    );
+}
+
+#[cfg(feature = "cli")]
+#[test]
+fn the_command_writes_whole_files_only() {
+    use cli::{Scratch, fails, names, succeeds};
+    let dir = Scratch::new("quantise");
+    let tiny = golden_path("tiny.safetensors");
+    let tiny = tiny.to_str().unwrap();
+    let out = dir.path("i8.safetensors");
+    let text = succeeds(&["quantize", tiny, out.to_str().unwrap(), "--scheme", "i8", "--keep", "*.fc1=f32"]);
+    assert!(text.contains("MB"), "{text}");
+    assert!(succeeds(&["inspect", out.to_str().unwrap()]).contains("quantised to i8"));
+
+    let again = dir.path("again.safetensors");
+    fails(1, &["quantize", out.to_str().unwrap(), again.to_str().unwrap(), "--scheme", "i8"]);
+    fails(1, &["quantize", out.to_str().unwrap(), out.to_str().unwrap(), "--scheme", "i4"]);
+    fails(1, &["quantize", "no/such.safetensors", again.to_str().unwrap(), "--scheme", "i8"]);
+    fails(2, &["quantize", tiny, again.to_str().unwrap(), "--scheme", "i3"]);
+    fails(2, &["quantize", tiny, again.to_str().unwrap(), "--scheme", "i8", "--auto", "-1"]);
+    fails(1, &["quantize", tiny, dir.path("no/folder/x").to_str().unwrap(), "--scheme", "i8"]);
+    assert_eq!(names(dir.path("i8.safetensors").parent().unwrap()), ["i8.safetensors"]);
+}
