@@ -18,6 +18,7 @@ pub mod par;
 pub mod pose;
 pub mod quant;
 pub mod recording;
+pub mod report;
 pub mod session;
 pub mod trace;
 pub mod user;

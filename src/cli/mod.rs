@@ -9,6 +9,7 @@ mod generate;
 mod inspect;
 mod progress;
 mod quantize;
+mod report;
 mod trace;
 
 use args::{Cli, Command, DemoArgs};
@@ -25,6 +26,7 @@ pub fn main() -> ExitCode {
             Command::Generate(args) => generate::run(&args),
             Command::Inspect(args) => inspect::run(&args),
             Command::Quantize(args) => quantize::run(&args),
+            Command::Report(args) => report::run(&args),
             Command::Trace(args) => trace::run(&args),
         },
         Err(e) => return usage(&e),

@@ -139,6 +139,35 @@ fn check(
     }
 }
 
+/// Scales at the ends of what floats hold, rows of zeros among huge and denormal ones, slices that begin anywhere.
+#[test]
+fn extreme_scales_have_the_same_bits_everywhere() {
+    let mut random = Random(7);
+    for (cols, out) in [(33, 17), (96, 70)] {
+        let (q, x) = (random.bytes(out * cols), random.floats(6 * cols + 1, 1.0));
+        let nibbles: Vec<u8> = random.bytes(out * cols.div_ceil(2)).into_iter().map(|v| v as u8).collect();
+        let scale: Vec<f32> = (0..out).map(|r| [0.0, 1e-45, 1e-38, 1.0, 1e30][r % 5]).collect();
+        let group_scale: Vec<f16> =
+            (0..out * cols.div_ceil(32)).map(|i| f16::from_f32([0.0, 6e-8, -1.0, 65504.0][i % 4])).collect();
+        let sizes = [0.0, 1e-40, 1e-30, 1.0, 1e30, 3e38];
+        let x: Vec<f32> =
+            std::iter::once(0.0).chain(x[1..].iter().enumerate().map(|(i, v)| v * sizes[i / cols])).collect();
+        for data in [WeightData::I8 { q: &q, scale: &scale }, WeightData::I4 { q: &nibbles, scale: &group_scale }] {
+            let mut first: Option<Vec<u32>> = None;
+            for kernels in levels() {
+                let m = kernels.pack(Weights { rows: out, cols, data }, None);
+                let mut exec = Exec::new(kernels, 1, Limits { rows: 6, width: cols }).unwrap();
+                let mut y = vec![0.5; 6 * out];
+                exec.linear(&m, &x[1..], 6, &mut y, Epilogue::Store);
+                assert!(y[..out].iter().all(|v| *v == 0.0), "a row of zeros gives zeros: {exec:?}");
+                // What is not a number has many bit patterns.
+                let y: Vec<u32> = y.iter().map(|v| if v.is_nan() { u32::MAX } else { v.to_bits() }).collect();
+                assert_eq!(*first.get_or_insert_with(|| y.clone()), y, "{exec:?}");
+            }
+        }
+    }
+}
+
 #[test]
 fn zero_and_broken_rows() {
     for kernels in levels() {

@@ -57,6 +57,18 @@ impl UserPath {
         Ok(Self { points })
     }
 
+    /// A path of positions (m) at times (s).
+    ///
+    /// # Errors
+    /// [`ErrorKind::UserPath`] when there are none, when times do not ascend, or for a value that is not finite.
+    pub fn from_points(points: Vec<(f64, Vec3)>) -> Result<Self> {
+        let finite = points.iter().all(|(t, p)| t.is_finite() && p.is_finite());
+        if points.is_empty() || !finite || points.windows(2).any(|w| w[1].0 <= w[0].0) {
+            return Err(bad("points of a path are finite, at ascending times, and at least one".into()));
+        }
+        Ok(Self { points })
+    }
+
     /// Times (s) and head positions (m), ascending in time; never empty.
     pub fn points(&self) -> &[(f64, Vec3)] {
         &self.points

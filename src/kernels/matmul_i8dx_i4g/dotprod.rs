@@ -1,5 +1,4 @@
-//! The frame of the NEON variant with `sdot`, which sums in i32 at once. i8mm has no variant of its own: nibbles are packed by
-//! quads of columns, as `sdot` reads them.
+//! The frame of the NEON variant with `sdot`, which sums in i32 at once.
 
 use std::arch::aarch64::*;
 

@@ -21,6 +21,8 @@ mod avxvnni;
 #[cfg(target_arch = "aarch64")]
 mod dotprod;
 #[cfg(target_arch = "aarch64")]
+mod i8mm;
+#[cfg(target_arch = "aarch64")]
 mod neon;
 mod scalar;
 
@@ -97,6 +99,8 @@ pub(crate) static VARIANTS: &[Variant<Run>] = &[
     Variant { name: "neon", level: Level::Neon, run: neon::run },
     #[cfg(target_arch = "aarch64")]
     Variant { name: "dotprod", level: Level::Dotprod, run: dotprod::run },
+    #[cfg(target_arch = "aarch64")]
+    Variant { name: "i8mm", level: Level::I8mm, run: i8mm::run },
 ];
 
 #[cfg(test)]

@@ -31,7 +31,10 @@ fn compare(
             buffer.of_mut::<u8>()[at] |= (nibble(random) & 15) << if high { 4 } else { 0 };
         }
         for g in 0..geo.groups {
-            buffer.of_mut::<f16>()[geo.scale_at(out, g)] = f16::from_f32(random.unit() * 0.1);
+            // Denormal, largest and zero scales among usual ones of both signs.
+            let usual = 0.1 * random.unit();
+            let scale = [usual, usual, -usual, 6e-8, 65504.0, 0.0][random.below(6)];
+            buffer.of_mut::<f16>()[geo.scale_at(out, g)] = f16::from_f32(scale);
         }
     }
     let (weights, scales) = (buffer.of::<u8>(), buffer.of::<f16>());

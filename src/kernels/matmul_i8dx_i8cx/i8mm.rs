@@ -11,7 +11,7 @@ const STREAMS: usize = 4;
 
 /// The intrinsic is not stable yet.
 #[target_feature(enable = "neon,i8mm")]
-fn smmla(mut acc: int32x4_t, x: int8x16_t, w: int8x16_t) -> int32x4_t {
+pub(crate) fn smmla(mut acc: int32x4_t, x: int8x16_t, w: int8x16_t) -> int32x4_t {
     // SAFETY: one register-only instruction of a feature that this function requires.
     unsafe {
         asm!("smmla {a:v}.4s, {x:v}.16b, {w:v}.16b", a = inout(vreg) acc, x = in(vreg) x, w = in(vreg) w,

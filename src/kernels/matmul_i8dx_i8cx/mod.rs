@@ -17,7 +17,7 @@ mod avxvnni;
 #[cfg(target_arch = "aarch64")]
 pub(crate) mod dotprod;
 #[cfg(target_arch = "aarch64")]
-mod i8mm;
+pub(crate) mod i8mm;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 mod scalar;

@@ -1,0 +1,304 @@
+//! From what was measured to a document.
+
+use super::chart::{bars, lines, number};
+use super::document::Document;
+use super::spread::Spread;
+use super::{Blocks, Measures, Numerics, Report};
+
+/// The whole report.
+pub(super) fn document(report: &Report) -> Document {
+    let mut d = Document::default();
+    d.heading(1, "Accuracy of quantised bundles");
+    let levels = format!("{} ({})", report.numerics.level, report.numerics.arch);
+    d.text(format!(
+        "Reference: {} (matrices {}), {}. CPU level {levels}. Sizes are against {:.2} MB, the reference's parameters as f32. \
+         Errors are teacher-forced: every block is computed from the reference's past, with the same noise, over {} blocks of the \
+         sample conversation, once with each sampler.",
+        report.reference,
+        report.reference_schemes,
+        report.made_by,
+        report.f32_bytes as f64 / 1e6,
+        report.numerics.blocks,
+    ));
+    in_short(report, &mut d);
+    targets(report, &mut d);
+    blocks(report, &mut d);
+    free(report, &mut d);
+    speed(report, &mut d);
+    machines(report, &mut d);
+    tensors(report, &mut d);
+    d
+}
+
+fn in_short(report: &Report, d: &mut Document) {
+    d.heading(2, "In short");
+    let mut rows = Vec::new();
+    for (i, c) in report.numerics.candidates.iter().enumerate() {
+        let verdicts: Vec<_> = report.targets[i].iter().map(super::Target::verdict).collect();
+        let count = |what| verdicts.iter().filter(|v| **v == what).count();
+        for b in &c.blocks {
+            let speed = report.speed.get(i + 1).and_then(|s| s.samplers.iter().find(|s| s.0 == b.sampler));
+            rows.push(vec![
+                c.name.clone(),
+                b.sampler.clone(),
+                format!("{:.3}", report.sizes[i]),
+                number(b.mm.mean),
+                number(b.mm.p99),
+                number(b.degrees.mean),
+                number(b.gaze.mean),
+                speed.map_or_else(|| "-".into(), |s| format!("{:.2}", s.3)),
+                format!("{} of {} met, {} not measured", count("met"), verdicts.len(), count("not measured")),
+            ]);
+        }
+    }
+    let head = [
+        "bundle",
+        "sampler",
+        "size / f32",
+        "joints, mean mm",
+        "p99 mm",
+        "rotations, mean deg",
+        "gaze error",
+        "time / reference",
+        "targets",
+    ];
+    d.table(&head, rows);
+}
+
+fn targets(report: &Report, d: &mut Document) {
+    d.heading(2, "Targets");
+    let mut rows = Vec::new();
+    for (c, targets) in report.numerics.candidates.iter().zip(&report.targets) {
+        for t in targets {
+            let measured = t.measured.map_or_else(|| "-".to_owned(), number);
+            rows.push(vec![c.name.clone(), t.what.clone(), number(t.target), measured, t.verdict().to_owned()]);
+        }
+    }
+    d.table(&["bundle", "figure", "at most", "measured", "verdict"], rows);
+    d.text(
+        "The worse of the samplers counts. The change of FGD needs real motion to measure distance from, which no bundle holds; \
+         the free runs below give each candidate's distance from the reference's motion beside what another seed alone changes.",
+    );
+}
+
+fn blocks(report: &Report, d: &mut Document) {
+    d.heading(2, "Teacher-forced blocks");
+    let mut rows = Vec::new();
+    for c in &report.numerics.candidates {
+        for b in &c.blocks {
+            let mut row = vec![c.name.clone(), b.sampler.clone(), b.frames.to_string()];
+            row.extend(four(&b.mm));
+            row.extend(four(&b.degrees));
+            row.extend([number(b.gaze.mean), number(b.gaze.p99), db(b.latent_sqnr_db)]);
+            row.extend([number(b.round_trip_mm.mean), number(b.round_trip_mm.p99)]);
+            rows.push(row);
+        }
+    }
+    let head = [
+        "bundle",
+        "sampler",
+        "frames",
+        "mm mean",
+        "p50",
+        "p99",
+        "max",
+        "deg mean",
+        "p50",
+        "p99",
+        "max",
+        "gaze mean",
+        "p99",
+        "latents dB",
+        "VAE mm mean",
+        "p99",
+    ];
+    d.table(&head, rows);
+    d.text(
+        "Joints: distance and angle to the reference's, over all joints and frames. VAE: the reference's motion through encoder and \
+         decoder, against the reference's own, which is what re-anchoring sees.",
+    );
+    let first: Vec<(&String, &Blocks)> =
+        report.numerics.candidates.iter().filter_map(|c| Some((&c.name, c.blocks.first()?))).collect();
+    let Some((_, some)) = first.first() else { return };
+    let names: Vec<String> = some.joints.iter().map(|j| j.joint.clone()).collect();
+    let series: Vec<_> =
+        first.iter().map(|(n, b)| ((*n).clone(), b.joints.iter().map(|j| j.mm.mean).collect())).collect();
+    d.picture(bars(&names, &series, "mean mm"), format!("Mean position error by joint, {}", some.sampler));
+    for (name, b) in first {
+        d.heading(3, format!("{name} by joint, {}", b.sampler));
+        let rows = b.joints.iter().map(|j| {
+            let mut row = vec![j.joint.clone()];
+            row.extend(four(&j.mm));
+            row.extend(four(&j.degrees));
+            row
+        });
+        d.table(&["joint", "mm mean", "p50", "p99", "max", "deg mean", "p50", "p99", "max"], rows.collect());
+    }
+}
+
+fn free(report: &Report, d: &mut Document) {
+    let f = &report.free;
+    d.heading(2, "Free-running sessions");
+    d.text(format!(
+        "{:.1} minutes of the sample conversation, repeated, with the default sampler and re-anchoring. Sessions from equal noise part \
+         because each block builds on the one before; their distributions have to agree. FGD is the Frechet distance of poses (m²) and of \
+         accelerations ((m/s²)²) from the reference's run. The row with another seed tells how much chance alone changes.",
+        f.minutes
+    ));
+    let all: Vec<&Measures> = [&f.reference, &f.other_seed].into_iter().chain(&f.candidates).collect();
+    let opt = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), number);
+    let rows = all.iter().map(|m| {
+        let s = &m.summary;
+        vec![
+            m.name.clone(),
+            opt(m.fgd),
+            opt(m.fgd_acceleration),
+            opt(s.head_angle),
+            opt(s.wrist_speed),
+            opt(s.speaking.and_then(|s| s.wrist_speed)),
+            opt(s.non_speaking.and_then(|s| s.wrist_speed)),
+            opt(s.foot_slide),
+            opt(s.support_foot_speed),
+            opt(s.seam),
+            opt(s.max_fit_error),
+            number(m.posture_mm.mean),
+            m.anchorings.to_string(),
+        ]
+    });
+    let head = [
+        "run",
+        "FGD",
+        "FGD acc",
+        "gaze",
+        "wrist m/s",
+        "speaking",
+        "not",
+        "foot slide",
+        "support m/s",
+        "seam",
+        "max fit m",
+        "posture apart, mm",
+        "re-anchored",
+    ];
+    d.table(&head, rows.collect());
+    let series: Vec<_> = all[1..].iter().map(|m| (m.name.clone(), m.divergence_mm.clone())).collect();
+    d.picture(
+        lines(&series, f.minutes, "minutes", "mean mm apart"),
+        "Distance of the joints from the reference's over time",
+    );
+}
+
+fn speed(report: &Report, d: &mut Document) {
+    d.heading(2, "Speed and memory");
+    let mb = |bytes: usize| format!("{:.2}", bytes as f64 / 1e6);
+    let mut rows = Vec::new();
+    for s in &report.speed {
+        for (sampler, read, ms, ratio) in &s.samplers {
+            let memory = [mb(s.file_bytes), mb(s.weight_bytes), mb(s.cache_bytes)];
+            let mut row = vec![s.name.clone(), sampler.clone()];
+            row.extend(memory);
+            row.extend([mb(*read), number(*ms), format!("{ratio:.2}")]);
+            rows.push(row);
+        }
+    }
+    let head = [
+        "bundle",
+        "sampler",
+        "file MB",
+        "weights MB",
+        "caches MB",
+        "read a block, MB",
+        "block p50, ms",
+        "time / reference",
+    ];
+    d.table(&head, rows);
+    d.text(
+        "Blocks of all bundles were timed in turns in this run, one thread; on a machine with other work the ratios mean more than the \
+         milliseconds. Weights are resident as packed for the CPU, caches are those of one session.",
+    );
+}
+
+fn machines(report: &Report, d: &mut Document) {
+    d.heading(2, "Other machines");
+    let Some([other, here]) = &report.machines else {
+        d.text(
+            "Not compared in this run: make a file with --numerics-only there and give it with --other-machine here.",
+        );
+        return;
+    };
+    d.text(format!(
+        "The same {} blocks on {} ({}) and on {} ({}). Integer sums are exact and float sums have a fixed order on every level, so the \
+         bits of the latents are to be the same.",
+        other.blocks, other.arch, other.level, here.arch, here.level
+    ));
+    let mut rows = Vec::new();
+    for (b, name, a) in pairs(other, here) {
+        let same = if a.bits == b.bits { "same" } else { "different" };
+        rows.push(vec![
+            name.to_owned(),
+            a.sampler.clone(),
+            number(a.mm.mean),
+            number(b.mm.mean),
+            number((a.mm.mean - b.mm.mean).abs()),
+            number(a.mm.p99),
+            number(b.mm.p99),
+            number((a.mm.p99 - b.mm.p99).abs()),
+            same.to_owned(),
+        ]);
+    }
+    let (a, b) = (format!("mm here ({})", here.arch), format!("there ({})", other.arch));
+    d.table(
+        &["bundle", "sampler", &a, &b, "difference", "p99 here", "there", "difference", "bits of the latents"],
+        rows,
+    );
+}
+
+/// Blocks of the same candidate and sampler on both machines: there, its name, here.
+fn pairs<'a>(there: &'a Numerics, here: &'a Numerics) -> impl Iterator<Item = (&'a Blocks, &'a str, &'a Blocks)> {
+    here.candidates.iter().flat_map(move |c| {
+        let other = there.candidates.iter().find(|o| o.name == c.name);
+        let blocks = c.blocks.iter().filter_map(move |a| {
+            let b = other?.blocks.iter().find(|b| b.sampler == a.sampler)?;
+            Some((b, c.name.as_str(), a))
+        });
+        blocks.collect::<Vec<_>>()
+    })
+}
+
+fn tensors(report: &Report, d: &mut Document) {
+    d.heading(2, "Tensors and layers");
+    d.text(
+        "Weights against the reference's, and each layer's outputs on inputs that the reference run gave it (cosine, signal to noise).",
+    );
+    for c in &report.numerics.candidates {
+        d.heading(3, &c.name);
+        let outputs: Vec<_> = c.tensors.iter().filter(|t| t.output.is_some_and(|o| o.sqnr_db.is_some())).collect();
+        let names: Vec<String> = outputs.iter().map(|t| t.name.clone()).collect();
+        let values = outputs.iter().filter_map(|t| t.output?.sqnr_db).collect();
+        if !names.is_empty() {
+            d.picture(bars(&names, &[("outputs".to_owned(), values)], "dB"), "Signal to noise of layer outputs");
+        }
+        let rows = c.tensors.iter().map(|t| {
+            vec![
+                t.name.clone(),
+                t.scheme.to_string(),
+                format!("{} x {}", t.shape[0], t.shape[1]),
+                t.bytes.to_string(),
+                db(t.sqnr_db),
+                number(t.max_error),
+                t.output.map_or_else(|| "-".into(), |o| format!("{:.6}", o.cosine)),
+                t.output.map_or_else(|| "-".into(), |o| db(o.sqnr_db)),
+            ]
+        });
+        let head = ["layer", "scheme", "shape", "bytes", "weights dB", "max error", "output cosine", "output dB"];
+        d.table(&head, rows.collect());
+    }
+}
+
+fn four(s: &Spread) -> [String; 4] {
+    [s.mean, s.p50, s.p99, s.max].map(number)
+}
+
+fn db(v: Option<f64>) -> String {
+    v.map_or_else(|| "equal".to_owned(), |v| format!("{v:.1}"))
+}

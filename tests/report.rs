@@ -1,0 +1,68 @@
+//! The accuracy report, end to end with a few blocks.
+#![cfg(feature = "cli")]
+
+#[path = "common/cli.rs"]
+mod cli;
+mod common;
+
+use cli::{Scratch, fails, names, succeeds};
+use common::tiny_f32;
+use visavis::kernels::Scheme;
+use visavis::quant::{Options, quantise};
+
+#[test]
+fn a_quick_report_tells_everything() {
+    let dir = Scratch::new("report");
+    let file = |name: &str, scheme| {
+        let options = Options { scheme, smallest: 0, keep: &[], budget: None };
+        let path = dir.file(name, quantise(&tiny_f32(), &options).unwrap().bytes);
+        path.to_str().unwrap().to_owned()
+    };
+    let (f16, i8) = (file("f16.safetensors", Scheme::F16), file("i8.safetensors", Scheme::I8));
+    let path = |name: &str| dir.path(name).to_str().unwrap().to_owned();
+    let (numerics, out) = (path("numerics.json"), path("out"));
+
+    succeeds(&["report", "--reference", &f16, "--candidate", &i8, "--quick", "--numerics-only", &numerics]);
+    let text = succeeds(&[
+        "report",
+        "--reference",
+        &f16,
+        "--candidate",
+        &i8,
+        "--quick",
+        "--out",
+        &out,
+        "--other-machine",
+        &numerics,
+    ]);
+    assert!(text.contains("mean joint error") && text.contains("report.html"), "{text}");
+    assert_eq!(names(&dir.path("out")), ["report.html", "report.json", "report.md"]);
+
+    let read = |name: &str| std::fs::read_to_string(dir.path("out").join(name)).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&read("report.json")).unwrap();
+    let candidate = &json["numerics"]["candidates"][0];
+    assert_eq!(candidate["blocks"].as_array().unwrap().len(), 2, "one for each sampler");
+    let mm = |v: &serde_json::Value| v["mm"]["mean"].as_f64().unwrap();
+    for block in candidate["blocks"].as_array().unwrap() {
+        assert!(mm(block) > 0.0 && block["mm"]["max"].as_f64().unwrap() >= block["mm"]["p99"].as_f64().unwrap());
+    }
+    let machines = json["machines"].as_array().unwrap();
+    assert_eq!(machines[0], machines[1], "the same machine gives the same numbers");
+    let tensors = candidate["tensors"].as_array().unwrap();
+    let row = |name: &str| tensors.iter().find(|t| t["name"] == name).unwrap();
+    let (run, unread) = (row("flow.layers.0.qkv"), row("vae.encoder.logvar"));
+    assert!(run["sqnr_db"].as_f64().unwrap() > 20.0 && run["output"]["cosine"].as_f64().unwrap() > 0.99, "{run}");
+    assert!(unread["output"].is_null(), "a layer that no block runs has no outputs: {unread}");
+    assert_eq!(json["speed"].as_array().unwrap().len(), 2);
+
+    let (html, md) = (read("report.html"), read("report.md"));
+    for part in ["In short", "Targets", "Free-running", "Speed", "Other machines", "flow.layers.0.qkv"] {
+        assert!(html.contains(part) && md.contains(part), "{part}");
+    }
+    assert!(html.contains("<svg") && !html.contains("http-equiv") && !html.contains("<script"), "pictures, no scripts");
+
+    // An int8 bundle is no reference, and another model is no candidate.
+    fails(1, &["report", "--reference", &i8, "--candidate", &f16, "--quick", "--out", &out]);
+    fails(1, &["report", "--reference", &f16, "--candidate", "no/such.safetensors", "--quick", "--out", &out]);
+    fails(2, &["report", "--reference", &f16, "--candidate", &i8, "--quick"]);
+}
