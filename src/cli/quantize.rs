@@ -35,7 +35,7 @@ pub fn run(args: &QuantizeArgs) -> Result<()> {
     print(&summary(args, &file, &quantised))
 }
 
-fn summary(args: &QuantizeArgs, file: &BundleFile, quantised: &Quantised) -> String {
+fn summary(args: &QuantizeArgs, file: &BundleFile<'_>, quantised: &Quantised) -> String {
     let mut counts = BTreeMap::<Scheme, usize>::new();
     quantised.schemes.values().for_each(|s| *counts.entry(*s).or_default() += 1);
     let counts: Vec<_> = counts.iter().map(|(scheme, n)| format!("{n} {scheme}")).collect();

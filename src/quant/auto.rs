@@ -60,7 +60,7 @@ struct Candidate<'a> {
 
 /// Raises `schemes` until blocks are within `budget`. Layers that `keep` names keep the scheme that it gave them.
 pub(super) fn choose(
-    file: &BundleFile,
+    file: &BundleFile<'_>,
     reference: &Engine,
     layers: &[Layer],
     mut schemes: BTreeMap<String, Scheme>,
@@ -141,14 +141,14 @@ fn extra_bytes(layer: &Layer, from: Scheme, to: Scheme) -> f64 {
 
 /// Measures bundles by teacher-forced blocks.
 struct Meter<'a> {
-    file: &'a BundleFile,
+    file: &'a BundleFile<'a>,
     reference: &'a Engine,
     layers: &'a [Layer],
     teachers: Vec<Teacher<'a>>,
 }
 
 impl<'a> Meter<'a> {
-    fn new(file: &'a BundleFile, reference: &'a Engine, layers: &'a [Layer], budget: &Budget<'_>) -> Result<Self> {
+    fn new(file: &'a BundleFile<'a>, reference: &'a Engine, layers: &'a [Layer], budget: &Budget<'_>) -> Result<Self> {
         let samplers = [Some(Sampler::Midpoint(4)), reference.config().student.map(|_| Sampler::Single)];
         let teachers = samplers
             .into_iter()

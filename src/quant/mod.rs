@@ -63,7 +63,7 @@ pub struct Quantised {
 /// # Errors
 /// Those of loading the bundle; [`ErrorKind::Argument`] when it is quantised already, when a pattern fits no layer, or when a weight
 /// is beyond the range of f16.
-pub fn quantise(file: &BundleFile, options: &Options<'_>) -> Result<Quantised> {
+pub fn quantise(file: &BundleFile<'_>, options: &Options<'_>) -> Result<Quantised> {
     let (config, tensors) = file.parse()?;
     refuse_twice(&config, &tensors, options.scheme).map_err(|e| e.with_path(file.path()))?;
     // Everything that loading checks holds from here on.

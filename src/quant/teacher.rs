@@ -94,7 +94,7 @@ impl<'e> Walker<'e> {
         let mut exec = engine.exec(1)?;
         let student = engine.student.as_ref().zip(c.student.map(|s| s.tau_history));
         let condition = Condition::absent(engine.layout());
-        let options = GeneratorOptions { sampler, dtype: KvDtype::F16 };
+        let options = GeneratorOptions { sampler, dtype: KvDtype::F16, clean_history: c.session.clean_history };
         let generator = Generator::new(&mut exec, &engine.flow, student, &condition, options);
         let mut this = Self {
             generator,

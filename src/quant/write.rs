@@ -14,7 +14,7 @@ type Entry = (String, Dtype, Vec<usize>, Vec<u8>);
 
 /// The bundle of `file` with its `layers` rounded to `schemes`; every other tensor stays as it is.
 pub(super) fn bundle(
-    file: &BundleFile,
+    file: &BundleFile<'_>,
     layers: &[Layer],
     schemes: &BTreeMap<String, Scheme>,
     asked: Scheme,
@@ -31,7 +31,7 @@ pub(super) fn bundle(
 }
 
 /// Puts weights in the place of those of `file` and records their schemes in its config.
-pub(super) fn assemble(file: &BundleFile, weights: &[(&Layer, StoredWeights)], asked: Scheme) -> Result<Vec<u8>> {
+pub(super) fn assemble(file: &BundleFile<'_>, weights: &[(&Layer, StoredWeights)], asked: Scheme) -> Result<Vec<u8>> {
     let (json, tensors) = file.raw()?;
     let mut entries: Vec<Entry> = Vec::new();
     let mut record = Quantisation { scheme: asked, tensors: BTreeMap::new() };

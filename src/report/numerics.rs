@@ -102,7 +102,7 @@ pub struct Numerics {
 /// A bundle, opened and loaded.
 pub(super) struct Loaded {
     pub(super) name: String,
-    pub(super) file: BundleFile,
+    pub(super) file: BundleFile<'static>,
     pub(super) engine: std::sync::Arc<Engine>,
 }
 

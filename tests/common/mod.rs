@@ -24,7 +24,7 @@ pub fn tiny() -> Arc<Engine> {
 }
 
 /// The tiny bundle in f32, with weights that f16 does not hold.
-pub fn tiny_f32() -> BundleFile {
+pub fn tiny_f32() -> BundleFile<'static> {
     let bytes = std::fs::read(golden_path("tiny.safetensors")).expect("the tiny bundle is there");
     let (_, header) = SafeTensors::read_metadata(&bytes).expect("a header");
     let file = SafeTensors::deserialize(&bytes).expect("a sound container");
