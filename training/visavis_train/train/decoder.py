@@ -71,6 +71,7 @@ def main():
     parser.add_argument("--blocks", type=int, default=32)
     parser.add_argument("--lr", type=float, default=4e-4)
     parser.add_argument("--free", type=float, default=1.0, help="factor on the losses of roll-outs")
+    parser.add_argument("--smooth", type=float, default=3.0, help="factor on the corpus half's losses of velocities and accelerations")
     parser.add_argument("--noise", type=float, default=1.2, help="greatest noise, in deviations of the flow's errors")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--workers", type=int, default=1, help="processes, each with batches of its own")
@@ -125,6 +126,7 @@ def main():
             y = net.decoder(z).float()
         parts = losses(x, y[:count], mean, std, mu, logvar, weights, jw)
         parts.pop("kl")
+        parts |= {k: args.smooth * parts[k] for k in ("velocity", "acceleration")}
         if free:
             parts |= {k: args.free * v for k, v in free_losses(y[count:], before, mean, std, weights).items()}
         common.set_rate(optim, common.rate(args.lr, step, progress, 50))

@@ -107,6 +107,7 @@ def main():
     parser.add_argument("--temperature", type=float, default=0.75, help="scale of the noise, as sessions use it")
     parser.add_argument("--lr", type=float, default=4e-4)
     parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--init", help="student checkpoint to start from; without it the flow")
     parser.add_argument("--workers", type=int, default=1, help="processes, each with teacher passes of its own")
     parser.add_argument("--resume", action="store_true")
     args = parser.parse_args()
@@ -119,7 +120,7 @@ def main():
     teacher, net = (FlowNet(base["latent"], base["audio"], **base["size"]) for _ in range(2))
     teacher.load_state_dict(base["ema"])
     teacher.eval().requires_grad_(False)
-    net.load_state_dict(base["ema"])
+    net.load_state_dict((torch.load(args.init, weights_only=False) if args.init else base)["ema"])
     metric, kept = base["metric"], {k: base[k] for k in ("size", "latent", "audio", "latent_mean", "latent_std", "metric")}
     optim, ema, clock, step = common.optimiser(net, args.lr), common.Ema(net, 0.998), common.Clock(args.minutes), 0
     if args.resume:
