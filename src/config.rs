@@ -152,6 +152,9 @@ pub struct SessionConfig {
     /// Late evaluations see history nearly clean; absent: history is imputed at each evaluation's own flow time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub clean_history: Option<CleanHistory>,
+    /// Time constant with which the difference at a border between blocks dies away, frames; 0 leaves borders as decoded.
+    #[serde(default = "bridge")]
+    pub bridge: f32,
     /// Blocks between re-anchorings; 0 never.
     pub anchor_period: u32,
     /// Distance from the anchor at which the session re-anchors early, metres.
@@ -174,6 +177,10 @@ impl CleanHistory {
     pub fn time(&self, t: f32) -> f32 {
         if t < self.from { t } else { t.max(self.tau) }
     }
+}
+
+fn bridge() -> f32 {
+    1.5
 }
 
 fn unscaled() -> f32 {

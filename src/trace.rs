@@ -60,7 +60,7 @@ pub struct Trace {
 /// Runs `input` through a session made with `options`, whose gaze is replaced by the input's, and returns every stage.
 ///
 /// For comparisons with an implementation of the networks alone, ask for [`crate::kernels::KvDtype::F32`] and
-/// [`crate::session::Anchoring::Never`], and turn [`SessionOptions::stance`] off.
+/// [`crate::session::Anchoring::Never`], and turn [`SessionOptions::bridge`] and [`SessionOptions::stance`] off.
 ///
 /// # Errors
 /// [`ErrorKind::Argument`] for options that the bundle cannot do, [`ErrorKind::Audio`] for voices that are not finite.

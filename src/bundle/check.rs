@@ -53,6 +53,7 @@ pub(super) fn config(c: &Config) -> Result<()> {
         real("session.clean_history.tau", h.tau, 0.0, 1.0)?;
         real("session.clean_history.from", h.from, 0.0, 1.0)?;
     }
+    real("session.bridge", c.session.bridge, 0.0, 30.0)?;
     within("session.anchor_period", c.session.anchor_period as usize, 0, 1 << 20)?;
     real("session.anchor_radius", c.session.anchor_radius, 0.1, 1e6)
 }

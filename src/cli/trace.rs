@@ -19,6 +19,7 @@ pub fn run(args: &TraceArgs) -> Result<()> {
         gaze_guidance: args.gaze_guidance,
         cache: KvDtype::F32,
         anchoring: Anchoring::Never,
+        bridge: false,
         stance: false,
         ..SessionOptions::default()
     };

@@ -1,10 +1,11 @@
 //! Feature vectors to world transforms and back.
 
+use super::bridge::Bridge;
 use super::icosahedron::{decode, encode};
 use super::stance::Stance;
 use super::{Fit, Rig};
 use crate::error::{Error, ErrorKind, Result};
-use crate::frame::{Frame, JOINT_CHANNELS, ROOT_CHANNELS, Root, Transform};
+use crate::frame::{BLOCK_FRAMES, Frame, JOINT_CHANNELS, ROOT_CHANNELS, Root, Transform};
 use crate::kernels::Kernels;
 use glam::{Mat3, Quat, Vec3};
 
@@ -35,9 +36,10 @@ pub struct Decoder {
     radius: f32,
     root: Root,
     fit: Fit,
+    bridge: Option<Bridge>,
     stance: Option<Stance>,
     kernels: Kernels,
-    /// Joints in the heading frame.
+    /// Joints of a block's frames, each frame's in its heading frame, `[4, J]`.
     joints: Vec<Transform>,
     maps: Vec<[f32; 9]>,
     rotations: Vec<[f32; 9]>,
@@ -53,16 +55,24 @@ impl Decoder {
             radius,
             root: Root::default(),
             fit: Fit::new(kernels, rig),
+            bridge: None,
             stance: None,
             kernels,
-            joints: vec![Transform::IDENTITY; n],
-            maps: vec![[0.0; 9]; n],
-            rotations: vec![[0.0; 9]; n],
+            joints: vec![Transform::IDENTITY; BLOCK_FRAMES * n],
+            maps: vec![[0.0; 9]; BLOCK_FRAMES * n],
+            rotations: vec![[0.0; 9]; BLOCK_FRAMES * n],
             previous: vec![Quat::IDENTITY; n],
         }
     }
 
-    /// The same with each step of the root corrected so that planted feet stay where they are (`stance.rs`).
+    /// The same with borders between blocks bridged (`bridge.rs`): a difference dies away with the time constant `frames`.
+    #[must_use]
+    pub fn with_bridge(mut self, rig: &Rig, frames: f32) -> Self {
+        self.bridge = Some(Bridge::new(rig, frames));
+        self
+    }
+
+    /// The same with planted feet held where they are (`stance.rs`).
     #[must_use]
     pub fn with_stance(mut self, rig: &Rig) -> Self {
         self.stance = Some(Stance::new(rig));
@@ -71,7 +81,7 @@ impl Decoder {
 
     /// Length F of a feature vector.
     pub fn feature_count(&self) -> usize {
-        feature_count(self.joints.len())
+        feature_count(self.previous.len())
     }
 
     /// The root of the last frame.
@@ -83,6 +93,7 @@ impl Decoder {
     pub fn reset(&mut self, root: Root) {
         self.root = root;
         self.fit.reset();
+        self.bridge.iter_mut().for_each(Bridge::reset);
         self.stance.iter_mut().for_each(Stance::reset);
         self.previous.fill(Quat::IDENTITY);
     }
@@ -91,45 +102,81 @@ impl Decoder {
     /// its other fields are left alone.
     ///
     /// # Errors
-    /// [`ErrorKind::State`] if a value of `x` is not finite; the decoder is then as before and `frame` untouched.
+    /// As [`Decoder::decode_block`].
     ///
     /// # Panics
     /// If `x` is not F long.
     pub fn decode(&mut self, x: &[f32], frame: &mut Frame) -> Result<()> {
-        assert_eq!(x.len(), self.feature_count(), "a feature vector has 3 + 36 J values");
+        self.decode_block(x, std::slice::from_mut(frame))
+    }
+
+    /// Decodes the next block of up to four frames, `x` `[frames, F]`, as [`Decoder::decode`] does one. Between the features and the
+    /// frames, in this order: the border to the block before is bridged, then planted feet are held.
+    ///
+    /// # Errors
+    /// [`ErrorKind::State`] if a value of `x` is not finite; the decoder is then as before and `frames` untouched.
+    ///
+    /// # Panics
+    /// If there are more than four frames, or `x` does not have as many vectors of length F.
+    pub fn decode_block(&mut self, x: &[f32], frames: &mut [Frame]) -> Result<()> {
+        let (n, width) = (self.previous.len(), self.feature_count());
+        assert!(frames.len() <= BLOCK_FRAMES, "a block has at most four frames");
+        assert_eq!(x.len(), width * frames.len(), "a feature vector has 3 + 36 J values");
         if !x.iter().all(|v| v.is_finite()) {
             return Err(Error::new(
                 ErrorKind::State,
                 "the model gave a pose that is not finite; reset the session, and check the bundle if it happens again",
             ));
         }
-        let (root, joints) = x.split_at(ROOT_CHANNELS);
-        let vertices = joints.as_chunks::<JOINT_CHANNELS>().0;
-        for ((joint, map), vertices) in self.joints.iter_mut().zip(&mut self.maps).zip(vertices) {
-            (joint.position, *map) = decode(vertices, self.radius);
+        self.transforms(x);
+        let step = |i: usize| [0, 1, 2].map(|c| x[i * width + c]);
+        if let Some(bridge) = &mut self.bridge
+            && !frames.is_empty()
+        {
+            let second = (frames.len() > 1).then(|| &self.joints[n..2 * n]);
+            bridge.start(&self.joints[..n], second, step(0));
         }
-        self.kernels.polar(&self.maps, &mut self.rotations);
-        for (joint, r) in self.joints.iter_mut().zip(&self.rotations) {
-            joint.rotation = Quat::from_mat3(&Mat3::from_cols_array(r).transpose()).normalize();
+        for (i, frame) in frames.iter_mut().enumerate() {
+            let joints = &mut self.joints[i * n..(i + 1) * n];
+            let mut step = step(i);
+            if let Some(bridge) = &mut self.bridge {
+                bridge.apply(joints, &mut step);
+            }
+            let [vx, vz, dyaw] = self.stance.as_mut().map_or(step, |stance| stance.hold(joints, step));
+            self.root = self.root.advanced(vx, vz, dyaw);
+            place(joints, &self.root, &mut self.previous, frame);
+            self.fit.fit(joints, &self.root, frame);
         }
-        let step = [root[0], root[1], root[2]];
-        let [vx, vz, dyaw] = self.stance.as_mut().map_or(step, |stance| stance.correct(&self.joints, step));
-        self.root = self.root.advanced(vx, vz, dyaw);
-        self.place(frame);
-        self.fit.fit(&self.joints, &self.root, frame);
         Ok(())
     }
 
-    fn place(&mut self, frame: &mut Frame) {
-        let heading = self.root.rotation();
-        frame.root = self.root;
-        frame.global.resize(self.joints.len(), Transform::IDENTITY);
-        for ((world, joint), previous) in frame.global.iter_mut().zip(&self.joints).zip(&mut self.previous) {
-            let q = (heading * joint.rotation).normalize();
-            let rotation = if q.dot(*previous) < 0.0 { -q } else { q };
-            *world = Transform { position: self.root.to_world(joint.position), rotation };
-            *previous = rotation;
+    /// Fills the first of `joints` from the feature vectors in `x`.
+    fn transforms(&mut self, x: &[f32]) {
+        let n = self.previous.len();
+        let count = x.len() / self.feature_count() * n;
+        let (joints, maps) = (&mut self.joints[..count], &mut self.maps[..count]);
+        let vectors = x.chunks_exact(feature_count(n));
+        let vertices = vectors.flat_map(|x| x[ROOT_CHANNELS..].as_chunks::<JOINT_CHANNELS>().0);
+        for ((joint, map), vertices) in joints.iter_mut().zip(&mut *maps).zip(vertices) {
+            (joint.position, *map) = decode(vertices, self.radius);
         }
+        self.kernels.polar(maps, &mut self.rotations[..count]);
+        for (joint, r) in joints.iter_mut().zip(&self.rotations) {
+            joint.rotation = Quat::from_mat3(&Mat3::from_cols_array(r).transpose()).normalize();
+        }
+    }
+}
+
+/// Writes `joints`, in the heading frame of `root`, to `frame` as world transforms; `previous` keeps their signs.
+fn place(joints: &[Transform], root: &Root, previous: &mut [Quat], frame: &mut Frame) {
+    let heading = root.rotation();
+    frame.root = *root;
+    frame.global.resize(joints.len(), Transform::IDENTITY);
+    for ((world, joint), previous) in frame.global.iter_mut().zip(joints).zip(previous) {
+        let q = (heading * joint.rotation).normalize();
+        let rotation = if q.dot(*previous) < 0.0 { -q } else { q };
+        *world = Transform { position: root.to_world(joint.position), rotation };
+        *previous = rotation;
     }
 }
 

@@ -140,7 +140,7 @@ fn plan(rig: &Rig, j: usize) -> Plan {
 }
 
 /// The shortest rotation that turns the direction of `from` into that of `to`; none where one of them has no direction.
-fn swing(from: Vec3, to: Vec3) -> Quat {
+pub(super) fn swing(from: Vec3, to: Vec3) -> Quat {
     let (from, to) = match (from.try_normalize(), to.try_normalize()) {
         (Some(from), Some(to)) => (from, to),
         _ => return Quat::IDENTITY,

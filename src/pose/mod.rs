@@ -7,6 +7,7 @@
 //!
 //! Everything is right-handed, metres, Y up; nothing here allocates once it is built.
 
+mod bridge;
 mod features;
 mod fit;
 mod gaze;

@@ -55,7 +55,10 @@ impl BlockState {
         let generator = Generator::new(&mut exec, &engine.flow, student, &condition, generator_options);
         exec.end();
         let rig = &engine.config.rig;
-        let motion = pose::Decoder::new(engine.kernels, rig, engine.config.pose.radius);
+        let mut motion = pose::Decoder::new(engine.kernels, rig, engine.config.pose.radius);
+        if options.bridge && engine.config.session.bridge > 0.0 {
+            motion = motion.with_bridge(rig, engine.config.session.bridge);
+        }
         let mut state = Self {
             inputs: Inputs::new(engine, options)?,
             generator,
@@ -159,12 +162,11 @@ impl BlockState {
         tell(&mut probe, block, "decoded", &self.features);
 
         engine.pose.restore(&mut self.features);
-        let width = engine.features();
-        for (i, (frame, x)) in self.frames.iter_mut().zip(self.features.chunks_exact(width)).enumerate() {
+        self.motion.decode_block(&self.features, &mut self.frames)?;
+        for (i, frame) in self.frames.iter_mut().enumerate() {
             frame.index = block * BLOCK_FRAMES as u64 + i as u64;
             frame.time = frame.index as f64 / f64::from(FPS);
             frame.sampler = options.sampler;
-            self.motion.decode(x, frame)?;
             let head = &frame.global[self.head];
             frame.gaze = self.inputs.head_at(frame.index).and_then(|user| gaze_score(&engine.config.rig, head, user));
         }

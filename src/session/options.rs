@@ -60,6 +60,8 @@ pub struct SessionOptions {
     pub cache: KvDtype,
     /// When recent motion is encoded anew.
     pub anchoring: Anchoring,
+    /// Whether borders between blocks are bridged, so that motion goes on as it was going; off for checks of the maths.
+    pub bridge: bool,
     /// Whether the root's steps are corrected so that planted feet stay where they are; off for checks of the maths.
     pub stance: bool,
     /// What runs the audio encoder.
@@ -81,6 +83,7 @@ impl Default for SessionOptions {
             start: Root::default(),
             cache: KvDtype::F16,
             anchoring: Anchoring::Bundle,
+            bridge: true,
             stance: true,
             audio: AudioBackend::default(),
         }

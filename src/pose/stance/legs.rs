@@ -1,0 +1,99 @@
+//! The leg of a planted foot: what the root cannot take up.
+
+use super::ik::reach;
+use super::{Contact, HEIGHT, earlier, fade, floor, turn, turned};
+use crate::frame::Transform;
+use crate::pose::Rig;
+use glam::{Quat, Vec2, Vec3};
+
+/// Share of its displacement that a swinging foot loses in a frame.
+const RELEASE: f32 = 0.25;
+/// A planted foot is held up to this far from where it was decoded, metres; beyond that it slides.
+const FURTHEST: f32 = 0.08;
+/// And turned by up to this angle, radians.
+const MOST_TURNED: f32 = 0.4;
+
+/// Holds one foot.
+#[derive(Debug, Clone)]
+pub(super) struct Leg {
+    /// Hips, upper leg, lower leg, foot, toes.
+    chain: [usize; 5],
+    /// How far the foot is from where it was decoded, `(x, z)` in the heading frame of the frame before, metres; about Y, radians.
+    moved: Vec2,
+    twisted: f32,
+    /// Heel and toes as shown, in the heading frame of the frame before.
+    shown: [Vec3; 2],
+}
+
+impl Leg {
+    /// The leg of `side` ("left", "right"), if the rig has a whole one.
+    pub(super) fn new(rig: &Rig, side: &str) -> Option<Self> {
+        let joint = |name: &str| rig.index(&format!("{side}{name}"));
+        let chain = [rig.index("hips")?, joint("UpperLeg")?, joint("LowerLeg")?, joint("Foot")?, joint("Toes")?];
+        let whole = chain.windows(2).all(|pair| rig.joints[pair[1]].parent == Some(pair[0]));
+        let leg = Self { chain, moved: Vec2::ZERO, twisted: 0.0, shown: [Vec3::ZERO; 2] };
+        whole.then_some(leg)
+    }
+
+    /// Forgets where the foot was.
+    pub(super) fn reset(&mut self) {
+        (self.moved, self.twisted) = (Vec2::ZERO, 0.0);
+    }
+
+    /// The first frame: the foot is shown as decoded.
+    pub(super) fn start(&mut self, points: [Vec3; 2]) {
+        self.shown = points;
+    }
+
+    /// Moves the leg in `joints` so that a planted foot is shown where it was shown in the frame before. `before` and `now` are heel and
+    /// toes as decoded, each in the heading frame of its frame; `step`, corrected, lies between.
+    pub(super) fn hold(
+        &mut self,
+        joints: &mut [Transform],
+        contact: &Contact,
+        before: &[Vec3; 2],
+        now: &[Vec3; 2],
+        step: [f32; 3],
+    ) {
+        let low = contact.low;
+        let planted = contact.planted(earlier(now[low], step) - floor(before[low]));
+        // A foot on its toes turns about them: its direction is held as far as both are down.
+        let flat = planted * fade(contact.clearance[1 - low], HEIGHT);
+        // Everything below is in this frame's heading frame.
+        let later = |p: Vec3| turned(floor(p) - Vec2::new(step[0], step[1]), -step[2]);
+        let shown = self.shown.map(later);
+        self.moved = turned(self.moved, -step[2]);
+
+        let line = floor(now[1]) - floor(now[0]);
+        self.twisted -= flat * turn(shown[1] - shown[0], turned(line, self.twisted));
+        let place = |moved: Vec2, twisted: f32| {
+            let heel = floor(now[0]) + moved;
+            [heel, heel + turned(line, twisted)]
+        };
+        self.moved -= planted * (place(self.moved, self.twisted)[low] - shown[low]);
+        let keep = 1.0 - RELEASE * (1.0 - planted);
+        self.moved = (keep * self.moved).clamp_length_max(FURTHEST);
+        self.twisted = ((1.0 - RELEASE * (1.0 - flat)) * self.twisted).clamp(-MOST_TURNED, MOST_TURNED);
+
+        let lift = (-contact.clearance[low]).max(0.0);
+        let target = now[0] + Vec3::new(self.moved.x, lift, self.moved.y);
+        self.shown = self.place(joints, target);
+    }
+
+    /// Puts the ankle at `target` as far as the leg reaches, turns the foot, and tells where heel and toes are then.
+    fn place(&self, joints: &mut [Transform], target: Vec3) -> [Vec3; 2] {
+        let [hips, upper, lower, foot, toes] = self.chain;
+        let at = |j: usize| joints[j].position;
+        let forward = joints[hips].rotation * Vec3::Z;
+        let Some(leg) = reach([at(upper), at(lower), at(foot)], target, forward) else {
+            return [at(foot), at(toes)];
+        };
+        let twist = Quat::from_rotation_y(self.twisted);
+        let tip = leg.ankle + twist * (at(toes) - at(foot));
+        for (j, turn) in [(upper, leg.turns[0]), (lower, leg.turns[1]), (foot, twist), (toes, twist)] {
+            joints[j].rotation = (turn * joints[j].rotation).normalize();
+        }
+        (joints[lower].position, joints[foot].position, joints[toes].position) = (leg.knee, leg.ankle, tip);
+        [leg.ankle, tip]
+    }
+}
