@@ -180,7 +180,7 @@ impl CleanHistory {
 }
 
 fn bridge() -> f32 {
-    1.5
+    0.8
 }
 
 fn unscaled() -> f32 {

@@ -1,9 +1,9 @@
 //! Borders between blocks: motion goes on as it was going and comes over to what the new block says.
 //!
 //! Blocks are decoded one by one, and the first frames of a block need not continue the last frames of the one before. At each
-//! border the motion as decoded is taken one frame further, position and velocity; what the new block has there instead is the
-//! *difference*. It is added to the new block's frames and dies away as a critically damped spring lets it (inertialisation:
-//! Bollo 2018). What is left of earlier differences goes on over the border, nothing is dropped there; no frame waits for
+//! border the motion as decoded is taken one frame further, with the mean of the velocities before and after, and what the new
+//! block has there instead, in place and in the other half of the velocity, is the *difference*. It is added to the new block's frames and dies away as a critically damped spring lets it
+//! (inertialisation: Bollo 2018). What is left of earlier differences goes on over the border, nothing is dropped there; no frame waits for
 //! another, and blocks that fit are not touched.
 //!
 //! Everything is relative to the parent joint: rotations, and the offset from the parent, which carries the bone's length. The
@@ -15,8 +15,6 @@ use glam::{Quat, Vec3};
 
 /// No difference of a joint is taken for larger than this, radians: what is further off jumps by the rest.
 const MAX_ANGLE: f32 = 1.5;
-/// Nor for faster, radians a frame (a hand's quickest turn is about 20 rad/s).
-const MAX_TURN: f32 = 0.7;
 
 /// A difference and its change a frame.
 #[derive(Debug, Clone, Copy, Default)]
@@ -90,16 +88,16 @@ impl Bridge {
             let [last, before] = joint.decoded;
             let next = link(joint.parent, j, first);
             let after = second.map(|joints| link(joint.parent, j, joints));
-            let turned = last.turn * before.turn.inverse();
-            let going = rotation_of(joint.turn.at) * turned * last.turn;
-            joint.turn.at = parameters(going * next.turn.inverse()).clamp_length_max(MAX_ANGLE / 4.0);
-            let moved = last.offset - before.offset;
-            joint.offset.at += last.offset + moved - next.offset;
+            let (mut going, mut moving) = (parameters(last.turn * before.turn.inverse()), last.offset - before.offset);
             if let Some(after) = after {
-                joint.turn.speed += parameters(turned) - parameters(after.turn * next.turn.inverse());
-                joint.turn.speed = joint.turn.speed.clamp_length_max(MAX_TURN / 4.0);
-                joint.offset.speed += moved - (after.offset - next.offset);
+                let change = 0.5 * (parameters(after.turn * next.turn.inverse()) - going);
+                (going, joint.turn.speed) = (going + change, joint.turn.speed - change);
+                let change = 0.5 * (after.offset - next.offset - moving);
+                (moving, joint.offset.speed) = (moving + change, joint.offset.speed - change);
             }
+            let reached = rotation_of(joint.turn.at) * rotation_of(going) * last.turn;
+            joint.turn.at = parameters(reached * next.turn.inverse()).clamp_length_max(MAX_ANGLE / 4.0);
+            joint.offset.at += last.offset + moving - next.offset;
         }
         self.steps.at += self.step - Vec3::from(step);
     }
