@@ -115,8 +115,8 @@ fn jittery(frames: usize, amount: f32) -> Recording {
     for block in recording.frames.chunks_mut(BLOCK_FRAMES) {
         let off: Vec<Quat> = (0..rig.len()).map(|_| Quat::from_scaled_axis(noise.vector() * amount)).collect();
         for frame in block {
-            for j in 1..rig.len() {
-                frame.local[j] = off[j] * frame.local[j];
+            for (local, off) in frame.local.iter_mut().zip(&off).skip(1) {
+                *local = *off * *local;
             }
             rig.fk(frame.hips, &frame.local, &mut frame.global);
             frame.root = root_of(&frame.global[0], 0.0);
