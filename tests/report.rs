@@ -14,7 +14,7 @@ use visavis::quant::{Options, quantise};
 fn a_quick_report_tells_everything() {
     let dir = Scratch::new("report");
     let file = |name: &str, scheme| {
-        let options = Options { scheme, smallest: 0, keep: &[], budget: None };
+        let options = Options { scheme, smallest: 0, keep: &[], calibration: None, budget: None };
         let path = dir.file(name, quantise(&tiny_f32(), &options).unwrap().bytes);
         path.to_str().unwrap().to_owned()
     };

@@ -29,7 +29,19 @@ pub fn run(args: &QuantizeArgs) -> Result<()> {
         None => None,
         Some(mm) => Some(Budget { mm, scene: Scene::new(&files::conversation()?, BLOCKS, None)?, progress: &progress }),
     };
-    let options = Options { scheme: args.scheme, smallest: SMALL, keep: &args.keep, budget: budget.as_ref() };
+    // Rounding to f16 has nothing to choose.
+    let calibrated = args.scheme != Scheme::F16 && !args.plain;
+    let calibration = match calibrated {
+        true => Some(Scene::new(&files::conversation()?, usize::MAX, None)?),
+        false => None,
+    };
+    let options = Options {
+        scheme: args.scheme,
+        smallest: SMALL,
+        keep: &args.keep,
+        calibration: calibration.as_ref(),
+        budget: budget.as_ref(),
+    };
     let quantised = quantise(&file, &options)?;
     write_atomically(&args.output, |w| w.write_all(&quantised.bytes))?;
     print(&summary(args, &file, &quantised))

@@ -7,9 +7,9 @@
 //! 3. The whole bundle is measured. While it is over the budget, the next layers are raised; each round raises at least one, so it
 //!    ends at the latest when everything is f16.
 
+use super::Rounder;
 use super::keep::Keep;
 use super::layers::Layer;
-use super::round::round;
 use super::teacher::{Scene, Teacher};
 use super::write;
 use crate::bundle::{BundleFile, StoredWeights};
@@ -62,14 +62,14 @@ struct Candidate<'a> {
 pub(super) fn choose(
     file: &BundleFile<'_>,
     reference: &Engine,
-    layers: &[Layer],
+    rounder: &Rounder<'_>,
     mut schemes: BTreeMap<String, Scheme>,
     keep: &[Keep],
     budget: &Budget<'_>,
 ) -> Result<(BTreeMap<String, Scheme>, Choice)> {
-    let meter = Meter::new(file, reference, layers, budget)?;
+    let meter = Meter::new(file, reference, rounder, budget)?;
     let mut candidates = Vec::new();
-    for layer in layers {
+    for layer in rounder.layers {
         let scheme = schemes[&layer.name];
         let fixed = keep.iter().any(|k| k.fits(&layer.name));
         if fixed || scheme >= layer.weights.scheme().min(Scheme::F16) || !meter.reaches(&layer.name) {
@@ -143,19 +143,24 @@ fn extra_bytes(layer: &Layer, from: Scheme, to: Scheme) -> f64 {
 struct Meter<'a> {
     file: &'a BundleFile<'a>,
     reference: &'a Engine,
-    layers: &'a [Layer],
+    rounder: &'a Rounder<'a>,
     teachers: Vec<Teacher<'a>>,
 }
 
 impl<'a> Meter<'a> {
-    fn new(file: &'a BundleFile<'a>, reference: &'a Engine, layers: &'a [Layer], budget: &Budget<'_>) -> Result<Self> {
+    fn new(
+        file: &'a BundleFile<'a>,
+        reference: &'a Engine,
+        rounder: &'a Rounder<'a>,
+        budget: &Budget<'_>,
+    ) -> Result<Self> {
         let samplers = [Some(Sampler::Midpoint(4)), reference.config().student.map(|_| Sampler::Single)];
         let teachers = samplers
             .into_iter()
             .flatten()
             .map(|sampler| Teacher::new(reference, budget.scene.clone(), sampler, 0, &mut None))
             .collect::<Result<_>>()?;
-        Ok(Self { file, reference, layers, teachers })
+        Ok(Self { file, reference, rounder, teachers })
     }
 
     /// Whether anything that is measured depends on layer `name`; the encoder's variance serves training alone.
@@ -165,8 +170,7 @@ impl<'a> Meter<'a> {
 
     /// Error, millimetres, with one layer at `scheme` and all others as they were.
     fn alone(&self, layer: &Layer, scheme: Scheme) -> Result<f64> {
-        let w = &layer.weights;
-        let stored = round(&w.to_f32(), w.rows, w.cols, scheme)?;
+        let stored = self.rounder.one(layer, scheme)?;
         let student = layer.name.starts_with("student.");
         // The student's layers are seen by single steps alone; for all others the reference sampler will do.
         let teachers = if student { &self.teachers[1..] } else { &self.teachers[..1] };
@@ -174,17 +178,12 @@ impl<'a> Meter<'a> {
     }
 
     fn whole(&self, schemes: &BTreeMap<String, Scheme>) -> Result<f64> {
-        let stored = |layer: &'a Layer| {
-            let (w, scheme) = (&layer.weights, schemes[&layer.name]);
-            let stored = if scheme == w.scheme() { w.clone() } else { round(&w.to_f32(), w.rows, w.cols, scheme)? };
-            Ok((layer, stored))
-        };
-        self.measure(&self.layers.iter().map(stored).collect::<Result<Vec<_>>>()?, &self.teachers)
+        self.measure(&self.rounder.all(schemes)?, &self.teachers)
     }
 
     /// The largest of the errors: of each sampler's blocks, and of the way through encoder and decoder.
     fn measure(&self, weights: &[(&Layer, StoredWeights)], teachers: &[Teacher<'_>]) -> Result<f64> {
-        let bytes = write::assemble(self.file, weights, Scheme::F16)?;
+        let bytes = write::bundle(self.file, weights, Scheme::F16)?;
         let engine = Engine::from_file(&BundleFile::from_bytes(bytes, self.file.path()), self.reference.kernels())?;
         teachers.iter().try_fold(0.0, |worst: f64, teacher| {
             let forced = teacher.compare(&engine)?;

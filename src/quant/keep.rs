@@ -73,7 +73,7 @@ pub(super) fn apply(options: &Options<'_>, layers: &[Layer]) -> Result<BTreeMap<
         let wanted = match kept {
             Some(scheme) => scheme,
             None if layer.elements() < options.smallest => stored,
-            None => default_scheme(&layer.name, options.scheme),
+            None => default_scheme(&layer.name, layer.elements(), options.scheme),
         };
         wanted.min(stored)
     };

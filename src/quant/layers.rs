@@ -40,18 +40,21 @@ pub fn layers(tensors: &Tensors<'_>) -> Result<Vec<Layer>> {
 /// Matrices with fewer weights than this stay as they are, if nothing else is asked for: together they are less than a hundredth of a bundle.
 pub const SMALL: usize = 8192;
 
+/// Layers of the audio encoder with as many weights as this are worth their int8.
+const LARGE: usize = 150_000;
+
 /// The scheme that layer `name` gets when `scheme` is asked for, if it is large enough to be quantised at all.
 ///
 /// - The flow's input projection and its latent embedding are multiplied with each other when a bundle is loaded: f16 at most.
-/// - The audio encoder is f16 in an int8 bundle, and int8 in an int4 bundle: its features condition everything that follows.
-/// - Modulation weights turn into tables when a session starts and are not read in a block; a table's error does not average out over
-///   blocks, so they are int8 at least.
-pub fn default_scheme(name: &str, scheme: Scheme) -> Scheme {
+/// - The audio encoder's features condition everything that follows. Its three largest convolutions are int8 in int8 and int4 bundles,
+///   its other layers f16 and int8.
+pub fn default_scheme(name: &str, elements: usize, scheme: Scheme) -> Scheme {
     let folded = name.ends_with(".input") || name.ends_with(".embed_latent");
+    let audio = name.starts_with("audio.");
     match scheme {
         Scheme::I8 | Scheme::I4 if folded => Scheme::F16,
-        Scheme::I8 if name.starts_with("audio.") => Scheme::F16,
-        Scheme::I4 if name.starts_with("audio.") || name.ends_with(".mod") || name.contains(".tau.") => Scheme::I8,
+        Scheme::I8 if audio && elements < LARGE => Scheme::F16,
+        Scheme::I4 if audio => Scheme::I8,
         other => other,
     }
 }

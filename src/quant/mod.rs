@@ -5,6 +5,8 @@
 //! | `layers` | the weight matrices of a bundle, and which of them are worth quantising |
 //! | `keep` | patterns of layer names that stay floats |
 //! | `round` | rounding to each scheme, with the scale that loses least |
+//! | `nearest_plane` | rounding by activation statistics |
+//! | `calibration` | those statistics, of a reference run over a conversation |
 //! | `teacher` | what quantisation does to a block: teacher-forced runs of two engines side by side |
 //! | `auto` | the scheme of each layer by measured sensitivity |
 //! | `write` | putting the bundle together |
@@ -14,8 +16,10 @@
 //! statistics stay as they are. The result depends on the input bundle and the options alone, bit for bit.
 
 mod auto;
+mod calibration;
 mod keep;
 mod layers;
+mod nearest_plane;
 mod round;
 mod teacher;
 #[cfg(test)]
@@ -23,12 +27,13 @@ mod tests;
 mod write;
 
 pub use auto::{Budget, Choice};
+pub use calibration::Calibration;
 pub use keep::Keep;
 pub use layers::{Layer, SMALL, default_scheme, layers};
 pub use round::{round, sqnr_db};
 pub use teacher::{Forced, FrameError, Scene, Teacher};
 
-use crate::bundle::{BundleFile, Tensors};
+use crate::bundle::{BundleFile, StoredWeights, Tensors};
 use crate::config::{Config, Quantisation};
 use crate::error::{Error, ErrorKind, Result};
 use crate::kernels::Scheme;
@@ -43,6 +48,9 @@ pub struct Options<'a> {
     pub smallest: usize,
     /// Layers that stay floats; the last pattern that fits a layer decides.
     pub keep: &'a [Keep],
+    /// What flows through the layers: int8 and int4 weights are rounded so that outputs on such inputs lose least. Without it
+    /// each weight goes to the nearest value.
+    pub calibration: Option<&'a Scene>,
     /// Raises layers to better schemes until blocks are within a budget of error.
     pub budget: Option<&'a Budget<'a>>,
 }
@@ -70,15 +78,43 @@ pub fn quantise(file: &BundleFile<'_>, options: &Options<'_>) -> Result<Quantise
     let reference = crate::engine::Engine::from_file(file, crate::kernels::Kernels::detect()?)?;
     let layers = layers(&tensors)?;
     let schemes = keep::apply(options, &layers)?;
+    let calibration = options.calibration.map(|scene| Calibration::new(&reference, scene)).transpose()?;
+    let rounder = Rounder { layers: &layers, calibration: calibration.as_ref() };
     let (schemes, choice) = match options.budget {
         None => (schemes, None),
         Some(budget) => {
-            let (schemes, choice) = auto::choose(file, &reference, &layers, schemes, options.keep, budget)?;
+            let (schemes, choice) = auto::choose(file, &reference, &rounder, schemes, options.keep, budget)?;
             (schemes, Some(choice))
         }
     };
-    let bytes = write::bundle(file, &layers, &schemes, options.scheme)?;
+    let bytes = write::bundle(file, &rounder.all(&schemes)?, options.scheme)?;
     Ok(Quantised { bytes, schemes, choice })
+}
+
+/// Layers and what is known of their inputs.
+struct Rounder<'a> {
+    layers: &'a [Layer],
+    calibration: Option<&'a Calibration>,
+}
+
+impl<'a> Rounder<'a> {
+    /// One layer at `scheme`; as it is where it is stored so.
+    fn one(&self, layer: &Layer, scheme: Scheme) -> Result<StoredWeights> {
+        let w = &layer.weights;
+        if scheme >= w.scheme() {
+            return Ok(w.clone());
+        }
+        let factor = self.calibration.filter(|_| scheme < Scheme::F16).and_then(|c| c.factor(&layer.name, w.cols));
+        match factor {
+            Some(r) => nearest_plane::round_for(&w.to_f32(), w.rows, w.cols, scheme, &r),
+            None => round(&w.to_f32(), w.rows, w.cols, scheme),
+        }
+    }
+
+    /// Every layer at its scheme of `schemes`.
+    fn all(&self, schemes: &BTreeMap<String, Scheme>) -> Result<Vec<(&'a Layer, StoredWeights)>> {
+        self.layers.iter().map(|layer| Ok((layer, self.one(layer, schemes[&layer.name])?))).collect()
+    }
 }
 
 /// Errors of quantising add up; what is quantised is to be quantised anew from the original.

@@ -69,7 +69,7 @@ fn half(v: f32) -> Result<f16> {
 }
 
 /// The integer in `low..=high` nearest to `v / scale`, half to even; 0 for a scale of 0.
-fn nearest(v: f32, scale: f32, low: f32, high: f32) -> f32 {
+pub(super) fn nearest(v: f32, scale: f32, low: f32, high: f32) -> f32 {
     if scale == 0.0 { 0.0 } else { (v / scale).round_ties_even().clamp(low, high) }
 }
 
@@ -86,7 +86,7 @@ fn largest(w: &[f32]) -> f32 {
 const TINY: f32 = 1e-30;
 
 /// Scale of a row of int8 weights, among those that clip up to a fifth of the range.
-fn int8_scale(row: &[f32]) -> f32 {
+pub(super) fn int8_scale(row: &[f32]) -> f32 {
     let top = largest(row);
     if top < TINY {
         return 0.0;
@@ -96,7 +96,7 @@ fn int8_scale(row: &[f32]) -> f32 {
 }
 
 /// Scale of a group of int4 weights. Nibbles reach further down than up, so a negative scale may fit better.
-fn int4_scale(group: &[f32]) -> Result<f16> {
+pub(super) fn int4_scale(group: &[f32]) -> Result<f16> {
     let top = largest(group);
     half(top / 7.0)?;
     let scales = (0..=24).flat_map(|i| [top, -top].map(|t| f16::from_f32(t / 8.0 * (1.15 - 0.02 * i as f32))));

@@ -89,9 +89,16 @@ struct Walker<'e> {
 
 impl<'e> Walker<'e> {
     /// At the start, with the idle clip's latents `idle` behind it.
-    fn new(engine: &'e Engine, sampler: Sampler, seed: u64, idle: &[f32]) -> Result<Self> {
+    fn new(
+        engine: &'e Engine,
+        sampler: Sampler,
+        seed: u64,
+        idle: &[f32],
+        activations: Option<Activations>,
+    ) -> Result<Self> {
         let c = engine.config();
         let mut exec = engine.exec(1)?;
+        exec.listen(activations);
         let student = engine.student.as_ref().zip(c.student.map(|s| s.tau_history));
         let condition = Condition::absent(engine.layout());
         let options = GeneratorOptions { sampler, dtype: KvDtype::F16, clean_history: c.session.clean_history };
@@ -267,8 +274,7 @@ impl<'e> Teacher<'e> {
         if sampler == Sampler::Single && engine.student.is_none() {
             return Err(argument("the single-step sampler needs a bundle with a student network".to_owned()));
         }
-        let mut walker = Walker::new(engine, sampler, seed, &engine.idle)?;
-        walker.exec.listen(activations.take());
+        let mut walker = Walker::new(engine, sampler, seed, &engine.idle, activations.take())?;
         let mut steps = Vec::with_capacity(scene.blocks);
         for block in 0..scene.blocks {
             walker.block(&scene, block)?;
@@ -304,7 +310,7 @@ impl<'e> Teacher<'e> {
         if (&a.rig, a.vae, a.flow, &a.audio) != (&b.rig, b.vae, b.flow, &b.audio) {
             return Err(argument("the candidate is not made from the reference: rig or sizes differ".to_owned()));
         }
-        let mut walker = Walker::new(candidate, self.sampler, self.seed, &self.engine.idle)?;
+        let mut walker = Walker::new(candidate, self.sampler, self.seed, &self.engine.idle, None)?;
         let mut forced = Forced { frames: Vec::new(), latents: [Vec::new(), Vec::new()], round_trip: Vec::new() };
         for (block, step) in self.steps.iter().enumerate() {
             walker.block(&self.scene, block)?;

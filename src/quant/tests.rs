@@ -82,3 +82,31 @@ fn patterns_name_layers() {
     // Many stars do not make matching slow.
     assert!(!fits(&"*a".repeat(40), &"a".repeat(39)));
 }
+
+/// Inputs that go together: what one weight loses the others can make up for.
+#[test]
+fn nearest_plane_beats_nearest_on_correlated_inputs() {
+    let (rows, cols, n) = (24, 70, 400);
+    let (w, noise) = (weights(rows * cols), weights(n * cols));
+    let x: Vec<f32> = (0..n * cols).map(|i| noise[i / cols * cols + (i % cols) / 8] + 0.2 * noise[i]).collect();
+    let mut moments = vec![0.0f64; cols * cols];
+    for x in x.chunks_exact(cols) {
+        for i in 0..cols {
+            (i..cols).for_each(|j| moments[i * cols + j] += f64::from(x[i]) * f64::from(x[j]));
+        }
+    }
+    let r = nearest_plane::factor(&moments, cols).unwrap();
+    let outputs = |w: &[f32]| -> Vec<f32> {
+        let dot = |x: &[f32], w: &[f32]| x.iter().zip(w).map(|(a, b)| a * b).sum::<f32>();
+        x.chunks_exact(cols).flat_map(|x| w.chunks_exact(cols).map(move |w| dot(x, w))).collect()
+    };
+    let exact = outputs(&w);
+    for scheme in [Scheme::I8, Scheme::I4] {
+        let plain = round(&w, rows, cols, scheme).unwrap();
+        let planes = nearest_plane::round_for(&w, rows, cols, scheme, &r).unwrap();
+        assert!(planes.borrow().is_complete() && planes.scheme() == scheme);
+        let db = |w: &StoredWeights| sqnr_db(&exact, &outputs(&w.to_f32()));
+        assert!(db(&planes) > db(&plain) + 3.0, "{scheme}: {} dB after {} dB", db(&planes), db(&plain));
+    }
+    assert_eq!(nearest_plane::factor(&[0.0; 4], 2), None, "a layer that nothing runs through");
+}

@@ -1,7 +1,6 @@
 //! Putting a quantised bundle together.
 
 use super::layers::Layer;
-use super::round::round;
 use crate::bundle::{BundleFile, CONFIG_KEY, StoredData, StoredWeights};
 use crate::config::Quantisation;
 use crate::error::{Error, ErrorKind, Result};
@@ -12,26 +11,8 @@ use std::collections::{BTreeMap, HashMap};
 
 type Entry = (String, Dtype, Vec<usize>, Vec<u8>);
 
-/// The bundle of `file` with its `layers` rounded to `schemes`; every other tensor stays as it is.
-pub(super) fn bundle(
-    file: &BundleFile<'_>,
-    layers: &[Layer],
-    schemes: &BTreeMap<String, Scheme>,
-    asked: Scheme,
-) -> Result<Vec<u8>> {
-    let rounded: Result<Vec<_>> = (layers.iter())
-        .map(|layer| {
-            let scheme = schemes.get(&layer.name).copied().unwrap_or(Scheme::F32).min(layer.weights.scheme());
-            let w = &layer.weights;
-            let stored = if scheme == w.scheme() { w.clone() } else { round(&w.to_f32(), w.rows, w.cols, scheme)? };
-            Ok((layer, stored))
-        })
-        .collect();
-    assemble(file, &rounded?, asked)
-}
-
 /// Puts weights in the place of those of `file` and records their schemes in its config.
-pub(super) fn assemble(file: &BundleFile<'_>, weights: &[(&Layer, StoredWeights)], asked: Scheme) -> Result<Vec<u8>> {
+pub(super) fn bundle(file: &BundleFile<'_>, weights: &[(&Layer, StoredWeights)], asked: Scheme) -> Result<Vec<u8>> {
     let (json, tensors) = file.raw()?;
     let mut entries: Vec<Entry> = Vec::new();
     let mut record = Quantisation { scheme: asked, tensors: BTreeMap::new() };

@@ -46,7 +46,7 @@ pub fn tiny_f32() -> BundleFile<'static> {
 /// The tiny bundle with all matrices at `scheme` that can be.
 pub fn tiny_in(scheme: Scheme) -> Arc<Engine> {
     let file = tiny_f32();
-    let options = Options { scheme, smallest: 0, keep: &[], budget: None };
+    let options = Options { scheme, smallest: 0, keep: &[], calibration: None, budget: None };
     let quantised = quantise(&file, &options).expect("it can be quantised");
     Engine::from_bytes(quantised.bytes, "tiny").expect("the result loads")
 }
