@@ -41,7 +41,7 @@ fn a_quick_report_tells_everything() {
     let read = |name: &str| std::fs::read_to_string(dir.path("out").join(name)).unwrap();
     let json: serde_json::Value = serde_json::from_str(&read("report.json")).unwrap();
     let candidate = &json["numerics"]["candidates"][0];
-    assert_eq!(candidate["blocks"].as_array().unwrap().len(), 2, "one for each sampler");
+    assert_eq!(candidate["blocks"].as_array().unwrap().len(), 4, "two samplers, two conversations");
     let mm = |v: &serde_json::Value| v["mm"]["mean"].as_f64().unwrap();
     for block in candidate["blocks"].as_array().unwrap() {
         assert!(mm(block) > 0.0 && block["mm"]["max"].as_f64().unwrap() >= block["mm"]["p99"].as_f64().unwrap());

@@ -142,6 +142,9 @@ pub struct ReportArgs {
     /// Blocks that are compared teacher-forced [default: 240, as many as the sample conversation has]
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<u32>::new().range(1..=10_000))]
     pub blocks: Option<u32>,
+    /// What `visavis eval --json` wrote for the reference and for each candidate, on the same clips
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub eval: Vec<PathBuf>,
     /// A few blocks of everything: to see that it works
     #[arg(long)]
     pub quick: bool,

@@ -22,6 +22,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
         minutes: if args.quick { 0.2 } else { args.minutes },
         timed: if args.quick { 10 } else { 200 },
         other,
+        eval: args.eval.clone(),
         progress: &progress,
     };
     if let Some(file) = &args.numerics_only {

@@ -47,6 +47,12 @@ impl Scene {
         Ok(Self { agent: voice(talk.agent()), user: voice(talk.user()), heads, blocks, gaze })
     }
 
+    /// The same user and length with the two voices exchanged: a conversation that nothing was chosen by.
+    #[must_use]
+    pub fn exchanged(&self) -> Self {
+        Self { agent: self.user.clone(), user: self.agent.clone(), ..self.clone() }
+    }
+
     /// Number of blocks.
     pub fn blocks(&self) -> usize {
         self.blocks

@@ -107,17 +107,24 @@ pub(super) fn measure(
     progress: &dyn Fn(&str),
 ) -> Result<FreeRun> {
     let minutes = talk.seconds() / 60.0;
-    progress(&format!("{minutes:.1} minutes of {}, twice", reference.name));
-    let base = run(reference, talk, 0)?;
-    let other_seed = run(reference, talk, 1)?.against(Some(&base), "reference, another seed");
-    let one = |c: &Loaded| {
-        progress(&format!("{minutes:.1} minutes of {}", c.name));
-        Ok(run(c, talk, 0)?.against(Some(&base), &c.name))
-    };
+    let all: Vec<_> = [(reference, 0), (reference, 1)].into_iter().chain(candidates.iter().map(|c| (c, 0))).collect();
+    progress(&format!("{} free runs of {minutes:.1} minutes, two at a time", all.len()));
+    let mut runs = Vec::with_capacity(all.len());
+    for pair in all.chunks(2) {
+        let done = std::thread::scope(|scope| {
+            let started: Vec<_> =
+                pair.iter().map(|(loaded, seed)| scope.spawn(move || run(loaded, talk, *seed))).collect();
+            started.into_iter().map(|run| run.join()).collect::<Vec<_>>()
+        });
+        for run in done {
+            runs.push(run.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?);
+        }
+    }
+    let base = &runs[0];
     Ok(FreeRun {
         minutes,
-        candidates: candidates.iter().map(one).collect::<Result<_>>()?,
-        other_seed,
         reference: base.against(None, &reference.name),
+        other_seed: runs[1].against(Some(base), "reference, another seed"),
+        candidates: candidates.iter().zip(&runs[2..]).map(|(c, run)| run.against(Some(base), &c.name)).collect(),
     })
 }

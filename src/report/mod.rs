@@ -3,6 +3,7 @@
 //! | file | what |
 //! |---|---|
 //! | `numerics` | tensors, layer outputs on real inputs, teacher-forced blocks: the same on every machine |
+//! | `judged` | metrics of `visavis eval` on recorded conversations, side by side |
 //! | `free` | free-running sessions: divergence, metrics side by side |
 //! | `speed` | block times in turns, bytes read, memory |
 //! | `targets` | what each scheme is held to |
@@ -11,6 +12,7 @@
 mod chart;
 mod document;
 mod free;
+mod judged;
 mod numerics;
 mod render;
 mod speed;
@@ -18,6 +20,7 @@ mod spread;
 mod targets;
 
 pub use free::{FreeRun, Measures};
+pub use judged::Judged;
 pub use numerics::{Blocks, CandidateNumerics, JointRow, LayerOutput, Numerics, TensorRow};
 pub use speed::Speed;
 pub use spread::Spread;
@@ -49,6 +52,8 @@ pub struct Options<'a> {
     pub timed: usize,
     /// Numerics of another machine, to be compared with those of this one.
     pub other: Option<Numerics>,
+    /// What `visavis eval --json` wrote for the reference and for each candidate on the same clips; none, or one each.
+    pub eval: Vec<PathBuf>,
     /// Told what is being done.
     pub progress: &'a dyn Fn(&str),
 }
@@ -72,6 +77,8 @@ pub struct Report {
     pub numerics: Numerics,
     /// Free-running sessions.
     pub free: FreeRun,
+    /// Metrics on recorded conversations.
+    pub judged: Option<Judged>,
     /// Costs, the reference first.
     pub speed: Vec<Speed>,
     /// Targets of each candidate.
@@ -85,6 +92,11 @@ pub struct Report {
 /// # Errors
 /// Those of loading; [`ErrorKind::Argument`] when a candidate has another rig or other sizes than the reference.
 pub fn run(options: &Options<'_>) -> Result<Report> {
+    if !options.eval.is_empty() && options.eval.len() != 1 + options.candidates.len() {
+        let message = "evaluations: give one of the reference, then one of each candidate, or none";
+        return Err(Error::new(ErrorKind::Argument, message));
+    }
+    let judged = (!options.eval.is_empty()).then(|| Judged::read(&options.eval)).transpose()?;
     let (reference, candidates) = load(options)?;
     let progress = options.progress;
     let scene = Scene::new(options.talk, options.blocks, None)?;
@@ -104,8 +116,9 @@ pub fn run(options: &Options<'_>) -> Result<Report> {
     let f32_bytes = contents.tensors.iter().map(|t| 4 * t.elements()).sum::<usize>();
     let sizes: Vec<_> = candidates.iter().map(|c| c.file.len() as f64 / f32_bytes as f64).collect();
     let schemes: Vec<_> = candidates.iter().map(scheme).collect();
-    let targets = (numerics.candidates.iter().zip(&sizes).zip(&schemes))
-        .map(|((n, size), scheme)| targets::targets(*scheme, n, *size, None))
+    let fgd_change = |i: usize| judged.as_ref().and_then(|j| j.fgd_change[i]);
+    let targets = (numerics.candidates.iter().zip(&sizes).zip(&schemes).enumerate())
+        .map(|(i, ((n, size), scheme))| targets::targets(*scheme, n, *size, fgd_change(i)))
         .collect();
     Ok(Report {
         made_by: format!("visavis {}", env!("CARGO_PKG_VERSION")),
@@ -116,6 +129,7 @@ pub fn run(options: &Options<'_>) -> Result<Report> {
         schemes,
         numerics,
         free,
+        judged,
         speed,
         targets,
         machines,

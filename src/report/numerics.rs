@@ -10,6 +10,8 @@ use serde::{Deserialize, Serialize};
 
 /// Inputs of each layer that its outputs are compared on, rows.
 const ROWS: usize = 96;
+/// Seed of the noise: another one than the quantiser's, which rounds for the sample conversation.
+const SEED: u64 = 1;
 
 /// One weight matrix against the reference's.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -44,7 +46,7 @@ pub struct LayerOutput {
 /// Teacher-forced blocks of one sampler.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Blocks {
-    /// The sampler.
+    /// The sampler, and whether the voices were exchanged.
     pub sampler: String,
     /// Frames compared.
     pub frames: usize,
@@ -118,8 +120,11 @@ pub(super) fn measure(
     let mut activations = Some(Activations::new(ROWS, 5));
     let mut teachers = Vec::new();
     for sampler in samplers.into_iter().flatten() {
-        progress(&format!("reference, {sampler}"));
-        teachers.push(Teacher::new(&reference.engine, scene.clone(), sampler, 0, &mut activations)?);
+        for (scene, told) in [(scene.clone(), ""), (scene.exchanged(), ", voices exchanged")] {
+            let label = format!("{sampler}{told}");
+            progress(&format!("reference, {label}"));
+            teachers.push((label, Teacher::new(&reference.engine, scene, sampler, SEED, &mut activations)?));
+        }
     }
     let activations = activations.unwrap_or_default();
     let layers = layers(&reference.file.parse()?.1)?;
@@ -127,10 +132,10 @@ pub(super) fn measure(
         progress(&format!("{}: tensors and layers", candidate.name));
         let tensors = tensors(candidate, &layers, &activations)?;
         let mut blocks = Vec::new();
-        for teacher in &teachers {
-            progress(&format!("{}: teacher-forced blocks, {}", candidate.name, teacher.sampler()));
+        for (label, teacher) in &teachers {
+            progress(&format!("{}: teacher-forced blocks, {label}", candidate.name));
             let forced = teacher.compare(&candidate.engine).map_err(|e| e.with_path(candidate.file.path()))?;
-            blocks.push(Blocks::of(teacher, &forced, &reference.engine));
+            blocks.push(Blocks::of(label, &forced, &reference.engine));
         }
         Ok(CandidateNumerics { name: candidate.name.clone(), tensors, blocks })
     };
@@ -180,7 +185,7 @@ fn product(kernels: Kernels, w: &crate::bundle::StoredWeights, x: &[f32], rows: 
 }
 
 impl Blocks {
-    fn of(teacher: &Teacher<'_>, forced: &Forced, reference: &Engine) -> Self {
+    fn of(label: &str, forced: &Forced, reference: &Engine) -> Self {
         let frames = &forced.frames;
         let (mm, degrees) = (1000.0, f64::to_degrees(1.0));
         let joint = |(j, joint): (usize, &crate::pose::Joint)| JointRow {
@@ -194,7 +199,7 @@ impl Blocks {
                 v.to_bits().to_le_bytes().iter().fold(hash, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x100_0000_01b3));
         }
         Self {
-            sampler: teacher.sampler().to_string(),
+            sampler: label.to_owned(),
             frames: frames.len(),
             mm: Spread::of(frames.iter().flat_map(|f| &f.joints), mm),
             degrees: Spread::of(frames.iter().flat_map(|f| &f.angles), degrees),

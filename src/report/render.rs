@@ -13,7 +13,8 @@ pub(super) fn document(report: &Report) -> Document {
     d.text(format!(
         "Reference: {} (matrices {}), {}. CPU level {levels}. Sizes are against {:.2} MB, the reference's parameters as f32. \
          Errors are teacher-forced: every block is computed from the reference's past, with the same noise, over {} blocks of the \
-         sample conversation, once with each sampler.",
+         sample conversation and as many with its voices exchanged, with each sampler. The quantiser rounds for the sample conversation \
+         with other noise; the exchanged voices are new to it.",
         report.reference,
         report.reference_schemes,
         report.made_by,
@@ -24,6 +25,7 @@ pub(super) fn document(report: &Report) -> Document {
     targets(report, &mut d);
     blocks(report, &mut d);
     free(report, &mut d);
+    judged(report, &mut d);
     speed(report, &mut d);
     machines(report, &mut d);
     tensors(report, &mut d);
@@ -37,7 +39,7 @@ fn in_short(report: &Report, d: &mut Document) {
         let verdicts: Vec<_> = report.targets[i].iter().map(super::Target::verdict).collect();
         let count = |what| verdicts.iter().filter(|v| **v == what).count();
         for b in &c.blocks {
-            let speed = report.speed.get(i + 1).and_then(|s| s.samplers.iter().find(|s| s.0 == b.sampler));
+            let speed = report.speed.get(i + 1).and_then(|s| s.samplers.iter().find(|s| b.sampler.starts_with(&s.0)));
             rows.push(vec![
                 c.name.clone(),
                 b.sampler.clone(),
@@ -76,8 +78,8 @@ fn targets(report: &Report, d: &mut Document) {
     }
     d.table(&["bundle", "figure", "at most", "measured", "verdict"], rows);
     d.text(
-        "The worse of the samplers counts. The change of FGD needs real motion to measure distance from, which no bundle holds; \
-         the free runs below give each candidate's distance from the reference's motion beside what another seed alone changes.",
+        "The worst of all rows counts. The change of FGD is that of the distance to recorded motion (evaluations below); where no \
+         evaluation was given, the free runs tell each candidate's distance from the reference's motion beside what another seed alone changes.",
     );
 }
 
@@ -186,6 +188,20 @@ fn free(report: &Report, d: &mut Document) {
         lines(&series, f.minutes, "minutes", "mean mm apart"),
         "Distance of the joints from the reference's over time",
     );
+}
+
+fn judged(report: &Report, d: &mut Document) {
+    d.heading(2, "Evaluations on recorded conversations");
+    let Some(judged) = &report.judged else {
+        d.text("Not given in this run: `visavis eval --model FILE --clips DIR --json FILE.json` for each bundle, then --eval here.");
+        return;
+    };
+    let rows = judged.metrics.iter().map(|(name, values)| {
+        let value = |v: &Option<f64>| v.map_or_else(|| "-".to_owned(), number);
+        std::iter::once(name.clone()).chain(values.iter().map(value)).collect()
+    });
+    let files = judged.files.iter().map(String::as_str);
+    d.table(&std::iter::once("metric").chain(files).collect::<Vec<_>>(), rows.collect());
 }
 
 fn speed(report: &Report, d: &mut Document) {
