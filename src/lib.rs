@@ -5,6 +5,7 @@ pub mod bundle;
 pub mod config;
 pub mod engine;
 pub mod error;
+pub mod eval;
 pub mod export;
 pub mod flow;
 pub mod frame;

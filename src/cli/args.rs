@@ -31,6 +31,8 @@ pub enum Command {
     Quantize(QuantizeArgs),
     /// Reports what quantised bundles lose and what they cost
     Report(ReportArgs),
+    /// Judges a bundle on recorded conversations: motion, gaze, reaction, endurance, against targets
+    Eval(super::eval::EvalArgs),
     /// Runs given conditioning and noise through a bundle and writes every stage
     Trace(TraceArgs),
 }
@@ -234,7 +236,7 @@ fn gaze(text: &str) -> Result<Gaze, String> {
     number(text, 0.0, 1.0).map(|g| Gaze(Some(g))).map_err(|e| format!("{e}, or off"))
 }
 
-fn weight(text: &str) -> Result<f32, String> {
+pub(super) fn weight(text: &str) -> Result<f32, String> {
     number(text, 0.0, 20.0)
 }
 
@@ -252,7 +254,7 @@ fn minutes(text: &str) -> Result<f64, String> {
     }
 }
 
-fn number(text: &str, low: f32, high: f32) -> Result<f32, String> {
+pub(super) fn number(text: &str, low: f32, high: f32) -> Result<f32, String> {
     match text.parse() {
         Ok(value) if (low..=high).contains(&value) => Ok(value),
         _ => Err(format!("it is a number from {low} to {high}")),

@@ -4,6 +4,7 @@
 
 mod args;
 mod demo;
+mod eval;
 mod files;
 mod generate;
 mod inspect;
@@ -27,6 +28,7 @@ pub fn main() -> ExitCode {
             Command::Inspect(args) => inspect::run(&args),
             Command::Quantize(args) => quantize::run(&args),
             Command::Report(args) => report::run(&args),
+            Command::Eval(args) => eval::run(&args),
             Command::Trace(args) => trace::run(&args),
         },
         Err(e) => return usage(&e),

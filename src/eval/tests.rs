@@ -1,0 +1,125 @@
+//! The evaluation knows good from bad, and does not depend on threads.
+
+use super::*;
+use crate::offline::Conversation;
+use crate::user::UserPath;
+use glam::Vec3;
+
+/// Half a minute of two voices that take turns, and a user who goes round the agent.
+fn talk() -> Conversation {
+    let voice = |turn: f32, pitch: f32| -> Vec<f32> {
+        let sample = |i: usize| {
+            let t = i as f32 / 24_000.0;
+            let speaks = (t / 3.0 + turn).rem_euclid(2.0) < 1.2;
+            let level = (20.0 * t + (1.7 * t).sin()).sin().max(0.0);
+            if speaks { 0.3 * level * (pitch * t).sin() } else { 0.0 }
+        };
+        (0..24_000 * 32).map(sample).collect()
+    };
+    let path = (0..32 * 30).map(|i| {
+        let a = 0.05 * i as f32 / 30.0;
+        (f64::from(i) / 30.0, Vec3::new(1.6 * a.sin(), 1.65, 1.6 * a.cos()))
+    });
+    let path = UserPath::from_points(path.collect()).unwrap();
+    Conversation::new(Some(voice(0.0, 800.0)), Some(voice(1.0, 1200.0)), Some(path)).unwrap()
+}
+
+fn tiny() -> Arc<Engine> {
+    Engine::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/goldens/tiny.safetensors")).unwrap()
+}
+
+fn quick(threads: usize) -> Report {
+    let engine = tiny();
+    let samplers = vec![Sampler::Midpoint(1), Sampler::Single];
+    let options = EvalOptions { windows: 4, threads, samplers, quick: true, ..EvalOptions::default() };
+    evaluate(&engine, &made_up(&engine.config().rig, &talk()), None, &options, &|_| {}).unwrap()
+}
+
+#[test]
+fn a_report_is_whole_and_the_same_on_any_number_of_threads() {
+    let report = quick(2);
+    assert_eq!(report.to_json(), quick(1).to_json());
+    let names: Vec<_> = report.rows.iter().map(|row| row.name.as_str()).collect();
+    assert_eq!(names[..5], ["corpus", "Random", "NN", "midpoint1", "single"]);
+    assert_eq!(report.rows.len(), 5 + 2 * GAZE_TARGETS.len());
+    assert_eq!((report.clips, report.windows[0]), (2, 4));
+
+    let truth = &report.rows[0].all;
+    assert!(truth.fgd.unwrap() < 1e-9 && truth.ape == Some(0.0) && truth.pck == Some(1.0), "{truth:?}");
+    assert!((truth.seam.unwrap() - 1.0).abs() < 0.1, "motion that knows no blocks: {truth:?}");
+    assert!(truth.head_angle.unwrap() > 0.9, "the procedural person looks at the user: {truth:?}");
+    assert!(truth.beat.unwrap() > truth.beat_shuffled.unwrap(), "and lifts its hands when it speaks: {truth:?}");
+    assert!(report.rows[0].wrist_ratio.unwrap() > 1.0);
+    // Random weights make no conversation: far from the corpus in pose and gaze, and the report says so.
+    let model = &report.rows[3].all;
+    assert!(model.fgd.unwrap() > 10.0 * report.rows[2].all.fgd.unwrap(), "{model:?}");
+    let missed = |what: &str| report.verdicts.iter().find(|v| v.what.starts_with(what)).unwrap().met == Some(false);
+    assert!(missed("FGD, midpoint1") && missed("VAE, joints"), "{:#?}", report.verdicts);
+
+    let json: serde_json::Value = serde_json::from_str(&report.to_json()).unwrap();
+    assert_eq!(json["rows"].as_array().unwrap().len(), report.rows.len());
+    for text in [report.to_text(), report.to_markdown()] {
+        for word in ["quick look", "corpus", "midpoint1, gaze 0.25", "reconstruction", "endurance", "missed"] {
+            assert!(text.contains(word), "{word} in {text}");
+        }
+    }
+}
+
+#[test]
+fn spoilt_motion_is_told_from_the_corpus() {
+    let engine = tiny();
+    let rig = &engine.config().rig;
+    let clips = made_up(rig, &talk());
+    let windows = Window::choose(&clips, 2).unwrap();
+    let measure = |spoil: &dyn Fn(usize, &mut Frame)| {
+        let of = |window: &Window| {
+            let mut frames = window.truth.frames.clone();
+            frames.iter_mut().enumerate().for_each(|(i, f)| spoil(i, f));
+            Measured::of(rig, window, frames).unwrap()
+        };
+        windows.iter().map(of).collect::<Vec<_>>()
+    };
+    let truth = measure(&|_, _| {});
+    let row = |spoil: &dyn Fn(usize, &mut Frame)| Row::new("spoilt".into(), None, &measure(spoil), &truth);
+    let right = row(&|_, _| {}).all;
+    // All joints 5 cm higher: FGD is the square of the shift of all 22.
+    let higher = row(&|_, f| f.global.iter_mut().for_each(|t| t.position.y += 0.05)).all;
+    assert!((higher.fgd.unwrap() - 22.0 * 0.0025).abs() < 2e-3, "{higher:?}");
+    assert!((higher.ape.unwrap() - 0.05).abs() < 1e-5 && higher.pck == Some(1.0), "{higher:?}");
+    // A jump to the side in every other block.
+    let jumpy = row(&|i, f| f.global.iter_mut().for_each(|t| t.position.x += if i % 8 < 4 { 0.0 } else { 0.02 })).all;
+    assert!(jumpy.seam.unwrap() > 5.0 && jumpy.fgd_acceleration > right.fgd_acceleration, "{jumpy:?}");
+    // Gliding at 10 cm/s.
+    let gliding = row(&|i, f| f.global.iter_mut().for_each(|t| t.position.x += i as f32 * 0.1 / 30.0)).all;
+    assert!(gliding.foot_slide > right.foot_slide && gliding.support_foot_speed.unwrap() > 0.08, "{gliding:?}");
+}
+
+#[test]
+fn windows_do_not_overlap_and_spread() {
+    let engine = tiny();
+    let clips = made_up(&engine.config().rig, &talk());
+    let windows = Window::choose(&clips, 3).unwrap();
+    assert_eq!(windows.iter().map(|w| w.clip).collect::<Vec<_>>(), [0, 1, 1]);
+    assert!(windows.iter().all(|w| w.segment.frames.len() == LEAD + WINDOW && w.truth.frames.len() == WINDOW));
+    assert_eq!(Window::choose(&clips, 100).unwrap().len(), 4, "32 s hold two windows");
+    assert_eq!(Window::choose(&[], 3).unwrap_err().kind(), ErrorKind::Argument);
+}
+
+#[test]
+fn nearest_neighbours_are_near() {
+    let engine = tiny();
+    let clips = made_up(&engine.config().rig, &talk());
+    let windows = Window::choose(&clips, 4).unwrap();
+    let bank = Bank::new(clips.clone(), false).unwrap();
+    // With its own clip in the bank, a window finds itself, give or take the step of the stretches.
+    let found = bank.nearest(&windows[0]).unwrap().unwrap();
+    let truth = &windows[0].truth.frames;
+    let off = |frames: &[Frame]| {
+        let pairs = frames.iter().zip(truth.iter()).flat_map(|(a, b)| a.global.iter().zip(&b.global));
+        pairs.map(|(a, b)| a.position.distance(b.position)).fold(0.0, f32::max)
+    };
+    assert!(off(&found) < 0.5, "{}", off(&found));
+    let random: Vec<_> = (0..8).map(|i| bank.random(&windows[0], i).unwrap().unwrap()[0].root).collect();
+    assert!(random.iter().all(|r| (r.x - truth[0].root.x).abs() < 1e-4), "put where the agent stands");
+    assert!(Bank::new(clips[..1].to_vec(), true).unwrap().nearest(&windows[0]).unwrap().is_none(), "not its own clip");
+}
