@@ -94,3 +94,24 @@ fn trace_draws_noise_from_the_seed_where_none_is_given() {
     assert_eq!(file.tensor("latents").unwrap().shape()[0], 2);
     assert!(file.tensor("agent_features").is_err(), "there was no voice");
 }
+
+#[test]
+fn eval_judges_a_bundle_and_writes_reports() {
+    let scratch = Scratch::new("files-eval");
+    let (json, md) = (scratch.path("eval.json"), scratch.path("eval.md"));
+    let (j, m) = (json.to_str().unwrap(), md.to_str().unwrap());
+    let args =
+        ["eval", "--model", TINY, "--quick", "--windows", "1", "--sampler", "single", "--threads", "1"].into_iter();
+    let text = succeeds(&args.chain(["--json", j, "--md", m]).collect::<Vec<_>>());
+    for word in ["corpus", "single, gaze 0.5", "Targets", "missed", "quick look"] {
+        assert!(text.contains(word), "expected `{word}`: {text}");
+    }
+    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
+    assert_eq!(report["windows"][0], 1);
+    assert!(report["rows"][0]["all"]["foot_slide"].is_number());
+    assert!(std::fs::read_to_string(&md).unwrap().contains("| single |"));
+
+    let wrong = scratch.file("clip.safetensors", b"not a clip, but long enough for a header");
+    let said = cli::fails(1, &["eval", "--model", TINY, "--clips", wrong.to_str().unwrap()]);
+    assert!(said.contains("clip.safetensors"), "{said}");
+}

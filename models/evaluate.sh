@@ -1,0 +1,12 @@
+#!/usr/bin/env bash
+# The table of a model card: models/evaluate.sh CLIPS [--model FILE] [--bank CLIPS] [more options of `visavis eval`]
+#
+# CLIPS is a folder of clips, best the test split of a corpus (training/README.md), and the bank its training split. Prints the tables and
+# writes them to out/eval/report.md and out/eval/report.json. About 20 minutes on two quiet cores with the default 64 windows.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+[ $# -gt 0 ] || { sed -n '2,5s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+clips=$1
+shift
+mkdir -p out/eval
+cargo run --release --quiet -- eval --clips "$clips" --json out/eval/report.json --md out/eval/report.md "$@"
