@@ -51,7 +51,7 @@ impl Buffer {
         }
         let map = MmapMut::map_anon(bytes + HUGE).ok()?;
         let from = map.as_ptr().align_offset(HUGE);
-        #[cfg(any(target_os = "linux", target_os = "android"))]
+        #[cfg(target_os = "linux")]
         let _ = map.advise_range(memmap2::Advice::HugePage, from, bytes / HUGE * HUGE);
         (from <= HUGE).then_some(Store::Pages(map, from))
     }

@@ -1,0 +1,143 @@
+package org.visavis;
+
+import static org.visavis.Check.direct;
+import static org.visavis.Check.engine;
+import static org.visavis.Check.equal;
+import static org.visavis.Check.isTrue;
+
+import java.nio.FloatBuffer;
+import java.util.Arrays;
+
+/** What a session does. */
+final class SessionTest {
+    private SessionTest() {}
+
+    static void testFramesComeWhenTheyAreDue() throws Exception {
+        try (VisavisEngine engine = engine();
+                VisavisSession session = engine.newSession(new SessionOptions().gaze(0.8f))) {
+            Conversation.push(session, 2, 48_000);
+            FloatBuffer frames = direct(session.layout().blockFloats());
+            equal(FrameLayout.FRAMES, session.poll(0, frames));
+            equal(0, session.poll(1_000_000, frames));
+            equal(0, frames.position());
+            equal(133_333_333L, session.nextDueNanos());
+            equal(FrameLayout.FRAMES, session.poll(session.nextDueNanos(), frames));
+            for (int f = 0; f < FrameLayout.FRAMES; f++) {
+                for (int j = 0; j < engine.skeleton().size(); j++) {
+                    int at = session.layout().joint(f, j);
+                    double norm = 0;
+                    for (int i = 0; i < 4; i++) {
+                        norm += frames.get(at + FrameLayout.LOCAL + i) * frames.get(at + FrameLayout.LOCAL + i);
+                    }
+                    isTrue(Math.abs(norm - 1) < 1e-4, "a unit quaternion");
+                }
+                isTrue(Math.abs(frames.get(session.layout().frame(f) + FrameLayout.GAZE)) <= 1, "gaze score");
+            }
+            SessionStats stats = session.stats();
+            equal(2L, stats.blocks);
+            isTrue(stats.headAccepted == 120 && stats.headNonFinite == 0, "heads");
+            isTrue(stats.cacheBytes > 0 && stats.blockMsMax > 0, "figures");
+        }
+    }
+
+    static void testBuffersAndArraysAreTheSame() throws Exception {
+        try (VisavisEngine engine = engine();
+                VisavisSession a = engine.newSession();
+                VisavisSession b = engine.newSession(new SessionOptions().threads(2).coreMask(-1L))) {
+            FloatBuffer voice = Conversation.voice(44_100, 44_100, 150, 0);
+            float[] array = new float[voice.remaining() + 5];
+            voice.get(array, 5, voice.remaining());
+            voice.rewind();
+            a.pushAgentAudio(voice, 44_100);
+            a.pushUserAudio(voice, 44_100);
+            for (int i = 5; i < array.length; i += 1000) {
+                b.pushAgentAudio(array, i, Math.min(1000, array.length - i), 44_100);
+            }
+            b.pushUserAudio(array, 5, array.length - 5, 44_100);
+            int floats = a.layout().blockFloats();
+            FloatBuffer direct = direct(floats + 3);
+            direct.position(3);
+            float[] out = new float[floats + 2];
+            for (int k = 0; k < 4; k++) {
+                long due = a.nextDueNanos();
+                equal(4, a.poll(due, direct));
+                equal(4, b.poll(due, out, 2));
+                float[] copy = new float[floats];
+                direct.duplicate().get(copy);
+                isTrue(Arrays.equals(copy, Arrays.copyOfRange(out, 2, out.length)), "block " + k);
+            }
+        }
+    }
+
+    static void testResetAndWarmUpReplay() throws Exception {
+        try (VisavisEngine engine = engine();
+                VisavisSession session = engine.newSession()) {
+            float[] first = new float[session.layout().blockFloats()];
+            session.poll(0, first, 0);
+            session.reset();
+            float[] second = new float[first.length];
+            session.poll(0, second, 0);
+            isTrue(Arrays.equals(first, second), "reset");
+            session.warmUp();
+            equal(0L, session.stats().blocks);
+            session.poll(0, second, 0);
+            isTrue(Arrays.equals(first, second), "warm-up");
+            isTrue(session.sessionTimeNanos() >= 0, "clock");
+        }
+    }
+
+    static void testSamplersAndGaze() throws Exception {
+        try (VisavisEngine engine = engine();
+                VisavisSession session = engine.newSession(new SessionOptions().sampler(Sampler.MIDPOINT2))) {
+            equal(Sampler.MIDPOINT2, session.sampler());
+            session.setSampler(Sampler.euler(8));
+            equal("euler:8", session.sampler().toString());
+            session.setGaze(1);
+            session.setNaturalGaze();
+            session.setGuidance(1.3f, 2);
+            if (engine.hasStudent()) {
+                session.setSampler(Sampler.SINGLE);
+            }
+            equal(4, session.poll(0, new float[session.layout().blockFloats()], 0));
+        }
+    }
+
+    static void testTooMuchAndTooLittleSound() throws Exception {
+        try (VisavisEngine engine = engine();
+                VisavisSession session = engine.newSession()) {
+            float[] second = new float[24_000];
+            for (int i = 0; i < 70; i++) {
+                session.pushAgentAudio(second, 0, second.length, 24_000);
+            }
+            session.pushUserAudio(second, 0, 100, 24_000);
+            Arrays.fill(second, 100);
+            session.pushAgentAudio(second, 0, 10, 24_000);
+            float[] out = new float[session.layout().blockFloats()];
+            for (int k = 0; k < 3; k++) {
+                session.poll(session.nextDueNanos(), out, 0);
+            }
+            SessionStats stats = session.stats();
+            equal(10L * 24_000 + 10, stats.agentVoice.overflowSamples);
+            equal(10L, stats.agentVoice.clippedSamples);
+            equal(2L * 3200 - 100, stats.userVoice.underrunSamples);
+            equal(0L, stats.agentVoice.underrunSamples);
+            session.clearAgentAudio();
+            session.finishAgentAudio();
+            session.setAgentAudioPresent(false);
+            session.setUserAudioPresent(true);
+            equal(4, session.poll(session.nextDueNanos(), out, 0));
+        }
+    }
+
+    static void testThreadsForPerformanceHints() throws Exception {
+        try (VisavisEngine engine = engine();
+                VisavisSession one = engine.newSession();
+                VisavisSession two = engine.newSession(new SessionOptions().threads(2))) {
+            equal(0, one.workerThreadIds().length);
+            equal(1, two.workerThreadIds().length);
+            isTrue(Visavis.currentThreadId() > 0 && two.workerThreadIds()[0] != Visavis.currentThreadId(), "ids");
+            Visavis.pinCurrentThread(-1L);
+            isTrue(Visavis.version().matches("\\d+\\.\\d+\\.\\d+.*"), Visavis.version());
+        }
+    }
+}

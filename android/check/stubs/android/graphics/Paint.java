@@ -1,0 +1,21 @@
+package android.graphics;
+
+public class Paint {
+    public static final int ANTI_ALIAS_FLAG = 1;
+
+    public enum Cap {
+        BUTT,
+        ROUND,
+        SQUARE
+    }
+
+    public Paint(int flags) {}
+
+    public void setColor(int color) {}
+
+    public void setStrokeWidth(float width) {}
+
+    public void setStrokeCap(Cap cap) {}
+
+    public void setTextSize(float size) {}
+}

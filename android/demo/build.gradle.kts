@@ -1,0 +1,44 @@
+plugins {
+    id("com.android.application")
+}
+
+android {
+    namespace = "org.visavis.demo"
+    compileSdk = 35
+
+    defaultConfig {
+        applicationId = "org.visavis.demo"
+        minSdk = 29
+        targetSdk = 35
+        versionCode = 1
+        versionName = "0.1.0"
+    }
+    buildTypes {
+        release {
+            isMinifyEnabled = true
+            proguardFiles(getDefaultProguardFile("proguard-android-optimize.txt"))
+            signingConfig = signingConfigs["debug"] // sideloading only
+        }
+    }
+    compileOptions {
+        sourceCompatibility = JavaVersion.VERSION_11
+        targetCompatibility = JavaVersion.VERSION_11
+    }
+    // Mapped where they lie in the APK: stored, not compressed.
+    androidResources { noCompress += listOf("safetensors", "wav") }
+    sourceSets["main"].assets.srcDir(layout.buildDirectory.dir("sampleAssets"))
+}
+
+dependencies {
+    implementation(project(":visavis"))
+    compileOnly("androidx.annotation:annotation:1.9.1")
+}
+
+// The bundle and the sample conversation, from the repository.
+val sampleAssets by tasks.registering(Copy::class) {
+    from("../../models") { include("visavis-base.safetensors") }
+    from("../../samples") { include("agent.wav", "user.wav") }
+    into(layout.buildDirectory.dir("sampleAssets"))
+}
+
+tasks.named("preBuild") { dependsOn(sampleAssets) }

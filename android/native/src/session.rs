@@ -1,0 +1,297 @@
+//! Sessions.
+
+use crate::buffers::{elements, part};
+use crate::engine::ENGINES;
+use crate::error::{Failure, Outcome, Throw};
+use crate::handles::Table;
+use crate::native;
+use glam::Vec3;
+use jni::Env;
+use jni::objects::{JClass, JFloatArray, JIntArray, JObject, JString};
+use jni::sys::{jboolean, jdouble, jfloat, jint, jlong};
+use std::cell::RefCell;
+use std::sync::{Arc, Mutex, MutexGuard};
+use visavis::audio::Voice;
+use visavis::frame::{BLOCK_FRAMES, Frame, Root};
+use visavis::session::{Session, SessionOptions};
+
+pub(crate) static SESSIONS: Table<Mutex<Session>> = Table::new("session");
+
+/// Floats of a frame before its joints: root x, z, yaw; hips x, y, z; gaze score (NaN: not known); fit error.
+const HEAD: usize = 8;
+/// Floats of a joint: local rotation 4, world position 3, world rotation 4.
+const JOINT: usize = 11;
+
+native!("Java_org_visavis_Native_sessionNew": session_new(
+    engine: jlong, seed: jlong, threads: jint, core_mask: jlong, sampler: JString, gaze: jfloat, guidance: jfloat,
+    gaze_guidance: jfloat, temperature: jfloat, x: jdouble, z: jdouble, yaw: jdouble, stance: jboolean
+) -> jlong);
+native!("Java_org_visavis_Native_sessionClose": session_close(session: jlong) -> jboolean);
+native!("Java_org_visavis_Native_pushBuffer": push_buffer(session: jlong, voice: jint, buffer: java.nio.FloatBuffer, position: jint, count: jint, rate: jint));
+native!("Java_org_visavis_Native_pushArray": push_array(session: jlong, voice: jint, samples: jfloat[], offset: jint, count: jint, rate: jint));
+native!("Java_org_visavis_Native_finishVoice": finish_voice(session: jlong, voice: jint));
+native!("Java_org_visavis_Native_clearVoice": clear_voice(session: jlong, voice: jint));
+native!("Java_org_visavis_Native_setVoicePresent": set_voice_present(session: jlong, voice: jint, present: jboolean));
+native!("Java_org_visavis_Native_pushHead": push_head(session: jlong, x: jfloat, y: jfloat, z: jfloat, time: jdouble));
+native!("Java_org_visavis_Native_setGaze": set_gaze(session: jlong, target: jfloat));
+native!("Java_org_visavis_Native_setNaturalGaze": set_natural_gaze(session: jlong));
+native!("Java_org_visavis_Native_setGuidance": set_guidance(session: jlong, weight: jfloat, gaze: jfloat));
+native!("Java_org_visavis_Native_setSampler": set_sampler(session: jlong, sampler: JString));
+native!("Java_org_visavis_Native_sampler": sampler(session: jlong) -> JString);
+native!("Java_org_visavis_Native_pollBuffer": poll_buffer(session: jlong, now: jdouble, out: java.nio.FloatBuffer, position: jint, count: jint) -> jint);
+native!("Java_org_visavis_Native_pollArray": poll_array(session: jlong, now: jdouble, out: jfloat[], offset: jint) -> jint);
+native!("Java_org_visavis_Native_nextDue": next_due(session: jlong) -> jdouble);
+native!("Java_org_visavis_Native_reset": reset(session: jlong));
+native!("Java_org_visavis_Native_warmUp": warm_up(session: jlong, blocks: jint));
+native!("Java_org_visavis_Native_workerThreadIds": worker_thread_ids(session: jlong) -> jint[]);
+
+/// Runs `body` on a session; calls from several threads take turns.
+pub(crate) fn with<T>(session: jlong, body: impl FnOnce(&mut Session) -> Outcome<T>) -> Outcome<T> {
+    let session = SESSIONS.get(session)?;
+    let mut guard: MutexGuard<'_, Session> = session.lock().map_err(|_| {
+        Failure::Fault("this session met an internal fault before: close it and make another".to_owned())
+    })?;
+    body(&mut guard)
+}
+
+fn of(session: &mut Session, voice: jint) -> Outcome<&mut Voice> {
+    match voice {
+        0 => Ok(session.agent_voice()),
+        1 => Ok(session.user_voice()),
+        _ => Err(Failure::Argument(format!("voice {voice}: 0 is the agent, 1 the user"))),
+    }
+}
+
+pub(crate) fn push(session: &mut Session, voice: jint, samples: &[f32], rate: u32) -> Outcome {
+    match voice {
+        0 => session.push_agent_audio(samples, rate)?,
+        _ => session.push_user_audio(samples, rate)?,
+    }
+    Ok(())
+}
+
+fn rate(rate: jint) -> Outcome<u32> {
+    u32::try_from(rate).map_err(|_| Failure::Argument(format!("a sample rate of {rate} Hz is negative")))
+}
+
+#[expect(clippy::too_many_arguments, reason = "one for each option")]
+fn session_new<'l>(
+    env: &mut Env<'l>,
+    _: JClass<'l>,
+    engine: jlong,
+    seed: jlong,
+    threads: jint,
+    core_mask: jlong,
+    sampler: JString<'l>,
+    gaze: jfloat,
+    guidance: jfloat,
+    gaze_guidance: jfloat,
+    temperature: jfloat,
+    x: jdouble,
+    z: jdouble,
+    yaw: jdouble,
+    stance: jboolean,
+) -> Outcome<jlong> {
+    let engine = ENGINES.get(engine)?;
+    // NaN is what Java's options hold for "the bundle's".
+    let given = |v: f32| (!v.is_nan()).then_some(v);
+    let options = SessionOptions {
+        seed: seed as u64,
+        threads: usize::try_from(threads).unwrap_or(0),
+        core_mask: (core_mask != 0).then_some(core_mask as u64),
+        sampler: sampler.try_to_string(env)?.parse()?,
+        gaze: given(gaze),
+        guidance: given(guidance),
+        gaze_guidance: given(gaze_guidance),
+        temperature: given(temperature),
+        start: Root { x, z, yaw },
+        stance,
+        ..Default::default()
+    };
+    Ok(SESSIONS.insert(Arc::new(Mutex::new(engine.session(options)?))))
+}
+
+fn session_close<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong) -> Outcome<jboolean> {
+    Ok(SESSIONS.remove(session))
+}
+
+#[expect(clippy::too_many_arguments, reason = "a buffer is three of them")]
+fn push_buffer<'l>(
+    env: &mut Env<'l>,
+    _: JClass<'l>,
+    session: jlong,
+    voice: jint,
+    buffer: JObject<'l>,
+    position: jint,
+    count: jint,
+    rate_: jint,
+) -> Outcome {
+    with(session, |s| {
+        of(s, voice)?;
+        // SAFETY: read only; see `elements`.
+        let samples = unsafe { elements::<f32>(env, &buffer, position, count) }?;
+        push(s, voice, samples, rate(rate_)?)
+    })
+}
+
+thread_local! {
+    /// Samples of an array on their way: as large as the largest push of this thread.
+    static SCRATCH: RefCell<Vec<f32>> = const { RefCell::new(Vec::new()) };
+}
+
+#[expect(clippy::too_many_arguments, reason = "a part of an array is three of them")]
+fn push_array<'l>(
+    env: &mut Env<'l>,
+    _: JClass<'l>,
+    session: jlong,
+    voice: jint,
+    samples: JFloatArray<'l>,
+    offset: jint,
+    count: jint,
+    rate_: jint,
+) -> Outcome {
+    if samples.is_null() {
+        return Err(jni::errors::Error::NullPtr("samples are null").into());
+    }
+    let count = part(samples.len(env)?, offset, count)?;
+    SCRATCH.with_borrow_mut(|scratch| {
+        scratch.resize(scratch.len().max(count), 0.0);
+        samples.get_region(env, offset, &mut scratch[..count])?;
+        with(session, |s| {
+            of(s, voice)?;
+            push(s, voice, &scratch[..count], rate(rate_)?)
+        })
+    })
+}
+
+fn finish_voice<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, voice: jint) -> Outcome {
+    with(session, |s| Ok(of(s, voice)?.finish()))
+}
+
+fn clear_voice<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, voice: jint) -> Outcome {
+    with(session, |s| Ok(of(s, voice)?.clear()))
+}
+
+fn set_voice_present<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, voice: jint, present: jboolean) -> Outcome {
+    with(session, |s| Ok(of(s, voice)?.set_present(present)))
+}
+
+fn push_head<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, x: f32, y: f32, z: f32, time: f64) -> Outcome {
+    with(session, |s| Ok(s.push_user_head(Vec3::new(x, y, z), time)?))
+}
+
+fn set_gaze<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, target: jfloat) -> Outcome {
+    with(session, |s| Ok(s.set_gaze(Some(target))?))
+}
+
+fn set_natural_gaze<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong) -> Outcome {
+    with(session, |s| Ok(s.set_gaze(None)?))
+}
+
+fn set_guidance<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, weight: jfloat, gaze: jfloat) -> Outcome {
+    with(session, |s| Ok(s.set_guidance(weight, gaze)?))
+}
+
+fn set_sampler<'l>(env: &mut Env<'l>, _: JClass<'l>, session: jlong, sampler: JString<'l>) -> Outcome {
+    let sampler = sampler.try_to_string(env)?.parse()?;
+    with(session, |s| Ok(s.set_sampler(sampler)?))
+}
+
+fn sampler<'l>(env: &mut Env<'l>, _: JClass<'l>, session: jlong) -> Outcome<JString<'l>> {
+    let name = with(session, |s| Ok(s.sampler().to_string()))?;
+    Ok(JString::from_str(env, name)?)
+}
+
+/// Writes the frames of a block, `HEAD + JOINT * joints` floats each.
+fn write(frames: &[Frame], out: &mut [f32]) {
+    let mut out = out.iter_mut();
+    let mut put = |values: &[f32]| out.by_ref().zip(values).for_each(|(to, v)| *to = *v);
+    for f in frames {
+        put(&[f.root.x as f32, f.root.z as f32, f.root.yaw as f32]);
+        put(&f.hips.to_array());
+        put(&[f.gaze.unwrap_or(f32::NAN), f.fit_error]);
+        for (global, local) in f.global.iter().zip(&f.local) {
+            put(&local.to_array());
+            put(&global.position.to_array());
+            put(&global.rotation.to_array());
+        }
+    }
+}
+
+/// Floats of a block of this session.
+fn block_floats(session: &Session) -> usize {
+    BLOCK_FRAMES * (HEAD + JOINT * session.engine().config().rig.joints.len())
+}
+
+fn room(session: &Session, there: usize) -> Outcome<usize> {
+    let needed = block_floats(session);
+    if there < needed {
+        return Err(Failure::Argument(format!(
+            "room for {there} floats, but a block has {needed}: FrameLayout.blockFloats()"
+        )));
+    }
+    Ok(needed)
+}
+
+fn poll_buffer<'l>(
+    env: &mut Env<'l>,
+    _: JClass<'l>,
+    session: jlong,
+    now: jdouble,
+    out: JObject<'l>,
+    position: jint,
+    count: jint,
+) -> Outcome<jint> {
+    with(session, |s| {
+        let needed = room(s, usize::try_from(count).unwrap_or(0))?;
+        // SAFETY: Java's caller owns the buffer for the time of the call; what is there is not read.
+        let out = unsafe { elements::<f32>(env, &out, position, needed as jint) }?;
+        let Some(frames) = s.poll(now)? else { return Ok(0) };
+        write(frames, out);
+        Ok(frames.len() as jint)
+    })
+}
+
+fn poll_array<'l>(
+    env: &mut Env<'l>,
+    _: JClass<'l>,
+    session: jlong,
+    now: jdouble,
+    out: JFloatArray<'l>,
+    offset: jint,
+) -> Outcome<jint> {
+    if out.is_null() {
+        return Err(jni::errors::Error::NullPtr("out is null").into());
+    }
+    let there = out.len(env)?;
+    with(session, |s| {
+        let needed = room(s, there.saturating_sub(usize::try_from(offset).unwrap_or(there)))?;
+        let Some(frames) = s.poll(now)? else { return Ok(0) };
+        SCRATCH.with_borrow_mut(|scratch| {
+            scratch.resize(scratch.len().max(needed), 0.0);
+            write(frames, &mut scratch[..needed]);
+            out.set_region(env, offset, &scratch[..needed])?;
+            Ok(frames.len() as jint)
+        })
+    })
+}
+
+fn next_due<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong) -> Outcome<jdouble> {
+    with(session, |s| Ok(s.next_due()))
+}
+
+fn reset<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong) -> Outcome {
+    with(session, |s| Ok(s.reset()?))
+}
+
+fn warm_up<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, blocks: jint) -> Outcome {
+    let blocks = u32::try_from(blocks).map_err(|_| Failure::Argument(format!("{blocks} blocks: not negative")))?;
+    with(session, |s| Ok(s.warm_up(blocks)?))
+}
+
+fn worker_thread_ids<'l>(env: &mut Env<'l>, _: JClass<'l>, session: jlong) -> Outcome<JIntArray<'l>> {
+    let ids: Vec<jint> = with(session, |s| Ok(s.worker_thread_ids().map(|id| id as jint).collect()))?;
+    let array = JIntArray::new(env, ids.len())?;
+    array.set_region(env, 0, &ids)?;
+    Ok(array)
+}

@@ -1,0 +1,101 @@
+package org.visavis;
+
+import androidx.annotation.NonNull;
+
+/** Statistics of a session since its start or reset. */
+public final class SessionStats {
+    /** Blocks computed. */
+    public final long blocks;
+    /** Computation time of a block over the last 4096, milliseconds: median. */
+    public final double blockMsP50;
+    /** 95th percentile. */
+    public final double blockMsP95;
+    /** 99th percentile. */
+    public final double blockMsP99;
+    /** Maximum. */
+    public final double blockMsMax;
+    /** From something that the user does to the start of the first block that can answer, at most, milliseconds. */
+    public final double userDelayMs;
+    /** The same for the agent's own voice; 0 when it is known ahead. */
+    public final double agentDelayMs;
+    /** Times that recent motion was encoded anew. */
+    public final long anchorings;
+    /** Bytes of all key-value caches. */
+    public final long cacheBytes;
+    /** The agent's voice. */
+    @NonNull
+    public final Voice agentVoice;
+    /** The user's voice. */
+    @NonNull
+    public final Voice userVoice;
+    /** Head positions that were taken. */
+    public final long headAccepted;
+    /** Ignored: not finite. */
+    public final long headNonFinite;
+    /** Ignored: not later than the one before. */
+    public final long headOutOfOrder;
+    /** Ignored: more than 1 km away, or a time of more than 10 million seconds. */
+    public final long headAbsurd;
+    /** Taken, but too far from the one before to have walked there. */
+    public final long headTeleports;
+    /** Dropped to make room before they were asked for. */
+    public final long headOverwritten;
+
+    /** Counters of a voice, samples of 24 kHz unless said otherwise. */
+    public static final class Voice {
+        /** Silence in place of sound that had not come, while the voice was present. */
+        public final long underrunSamples;
+        /** Dropped because a minute of sound was waiting already. */
+        public final long overflowSamples;
+        /** Clipped to 8 times full scale, input samples: a sign of integers pushed as floats. */
+        public final long clippedSamples;
+
+        Voice(Row row) {
+            underrunSamples = row.count();
+            overflowSamples = row.count();
+            clippedSamples = row.count();
+        }
+    }
+
+    /** What the native library gives, read from the front. */
+    private static final class Row {
+        private final double[] values;
+        private int next;
+
+        Row(double[] values) {
+            this.values = values;
+        }
+
+        double number() {
+            return values[next++];
+        }
+
+        long count() {
+            return (long) number();
+        }
+    }
+
+    SessionStats(double[] values) {
+        Row row = new Row(values);
+        blocks = row.count();
+        blockMsP50 = row.number();
+        blockMsP95 = row.number();
+        blockMsP99 = row.number();
+        blockMsMax = row.number();
+        userDelayMs = row.number();
+        agentDelayMs = row.number();
+        anchorings = row.count();
+        cacheBytes = row.count();
+        agentVoice = new Voice(row);
+        userVoice = new Voice(row);
+        headAccepted = row.count();
+        headNonFinite = row.count();
+        headOutOfOrder = row.count();
+        headAbsurd = row.count();
+        headTeleports = row.count();
+        headOverwritten = row.count();
+        if (row.next != values.length) {
+            throw new VisavisException("the native library gives " + values.length + " statistics, not " + row.next);
+        }
+    }
+}

@@ -1,0 +1,221 @@
+package org.visavis;
+
+import androidx.annotation.NonNull;
+import java.nio.ByteOrder;
+import java.nio.FloatBuffer;
+
+/**
+ * One conversation with one user. Any thread may call; calls on one session take turns.
+ *
+ * <p>Times are nanoseconds of session time: 0 when the session is made or reset. {@link #sessionTimeNanos()} is a clock of that kind; a
+ * program that replays a recording, or has a clock of its own, passes times itself. Audio has no times: each voice is one
+ * continuous stream that starts at 0.
+ *
+ * <p>Buffers are direct and in native byte order, {@code ByteBuffer.allocateDirect(4 * n).order(ByteOrder.nativeOrder()).asFloatBuffer()};
+ * their position and limit are heeded and left as they are. Each method has a variant for arrays, which copies.
+ */
+public final class VisavisSession implements AutoCloseable {
+    private static final int AGENT = 0;
+    private static final int USER = 1;
+
+    private final long handle;
+    private final FrameLayout layout;
+    private volatile long start = System.nanoTime();
+
+    VisavisSession(long handle, Skeleton skeleton) {
+        this.handle = handle;
+        this.layout = new FrameLayout(skeleton.size());
+    }
+
+    /**
+     * Appends to the agent's own voice: mono samples, full scale 1, up to a minute ahead of time (more is dropped and counted).
+     * Sound that has not come when a block is computed is silence there, is counted, and is heard later.
+     *
+     * @param rate samples a second, 8000 to 192000
+     * @throws IllegalArgumentException for a rate out of range, samples that are not finite (nothing is taken), or a buffer that is not direct
+     * @throws IllegalStateException when this session is closed
+     */
+    public void pushAgentAudio(@NonNull FloatBuffer samples, int rate) {
+        push(AGENT, samples, rate);
+    }
+
+    /** As {@link #pushAgentAudio(FloatBuffer, int)}, from a part of an array. */
+    public void pushAgentAudio(@NonNull float[] samples, int offset, int count, int rate) {
+        Native.pushArray(handle, AGENT, samples, offset, count, rate);
+    }
+
+    /** Appends to the user's voice, as {@link #pushAgentAudio(FloatBuffer, int)}. */
+    public void pushUserAudio(@NonNull FloatBuffer samples, int rate) {
+        push(USER, samples, rate);
+    }
+
+    /** As {@link #pushUserAudio(FloatBuffer, int)}, from a part of an array. */
+    public void pushUserAudio(@NonNull float[] samples, int offset, int count, int rate) {
+        Native.pushArray(handle, USER, samples, offset, count, rate);
+    }
+
+    /** Ends an utterance of the agent: the last milliseconds, which wait in the resampler, come out. Optional. */
+    public void finishAgentAudio() {
+        Native.finishVoice(handle, AGENT);
+    }
+
+    /** Drops all sound of the agent that has not been used, as when it is interrupted. */
+    public void clearAgentAudio() {
+        Native.clearVoice(handle, AGENT);
+    }
+
+    /** Makes the agent's voice present (silent until something is pushed) or absent (until the next push). */
+    public void setAgentAudioPresent(boolean present) {
+        Native.setVoicePresent(handle, AGENT, present);
+    }
+
+    /** The same for the user's voice, as when a microphone is muted. */
+    public void setUserAudioPresent(boolean present) {
+        Native.setVoicePresent(handle, USER, present);
+    }
+
+    /**
+     * Tells where the user's head is (midpoint of the eyes), world metres. Any rate; positions that are not finite, out of order or
+     * impossible are ignored and counted.
+     */
+    public void pushUserHead(float x, float y, float z, long timeNanos) {
+        Native.pushHead(handle, x, y, z, timeNanos * 1e-9);
+    }
+
+    /**
+     * Sets the gaze target from the next block on: 0 averted, 1 sustained eye contact.
+     *
+     * @throws IllegalArgumentException outside -1 to 1
+     */
+    public void setGaze(float target) {
+        Native.setGaze(handle, target);
+    }
+
+    /** Leaves the gaze to the model from the next block on. */
+    public void setNaturalGaze() {
+        Native.setNaturalGaze(handle);
+    }
+
+    /** Sets the guidance weights, 0 to 20: of the conditioning as a whole (1 is none), and of the gaze target. */
+    public void setGuidance(float weight, float gaze) {
+        Native.setGuidance(handle, weight, gaze);
+    }
+
+    /**
+     * Sets the sampler from the next block on.
+     *
+     * @throws IllegalArgumentException when this session has no room, or the bundle no student, for it
+     */
+    public void setSampler(@NonNull Sampler sampler) {
+        Native.setSampler(handle, sampler.name);
+    }
+
+    /** The sampler that the next block will use. */
+    @NonNull
+    public Sampler sampler() {
+        return Sampler.of(Native.sampler(handle));
+    }
+
+    /** Where things are in what {@link #poll} writes. */
+    @NonNull
+    public FrameLayout layout() {
+        return layout;
+    }
+
+    /** As {@link #poll(long, FloatBuffer)} at {@link #sessionTimeNanos()}. */
+    public int poll(@NonNull FloatBuffer frames) {
+        return poll(sessionTimeNanos(), frames);
+    }
+
+    /**
+     * Computes the next block if it is due, and writes its frames from the buffer's position on, as {@link FrameLayout} says.
+     * Call it until it returns 0: who comes late gets all blocks that were missed. Nothing is allocated.
+     *
+     * @param timeNanos session time; never runs backwards
+     * @return frames written: 4, or 0 when no block is due
+     * @throws IllegalArgumentException when the buffer is too small (nothing is computed), not direct, or read-only
+     * @throws IllegalStateException when time runs backwards, or this session is closed
+     */
+    public int poll(long timeNanos, @NonNull FloatBuffer frames) {
+        checked(frames);
+        if (frames.isReadOnly()) {
+            throw new IllegalArgumentException("the buffer is read-only");
+        }
+        return Native.pollBuffer(handle, seconds(timeNanos), frames, frames.position(), frames.remaining());
+    }
+
+    /** As {@link #poll(long, FloatBuffer)}, into an array from {@code offset} on. */
+    public int poll(long timeNanos, @NonNull float[] frames, int offset) {
+        return Native.pollArray(handle, seconds(timeNanos), frames, offset);
+    }
+
+    /** Session time by the system's clock: nanoseconds since this session was made or reset. */
+    public long sessionTimeNanos() {
+        return System.nanoTime() - start;
+    }
+
+    /** Session time at which the next block is due, nanoseconds. */
+    public long nextDueNanos() {
+        return (long) Math.ceil(Native.nextDue(handle) * 1e9 - 0.5);
+    }
+
+    /** Starts anew with the options of now; session time is 0 again. Same inputs, same bits. */
+    public void reset() {
+        Native.reset(handle);
+        start = System.nanoTime();
+    }
+
+    /** Computes two blocks for nothing and starts anew, so that memory and CPU are warm when the first block is due. */
+    public void warmUp() {
+        warmUp(2);
+    }
+
+    /** The same with another number of blocks. */
+    public void warmUp(int blocks) {
+        Native.warmUp(handle, blocks);
+        start = System.nanoTime();
+    }
+
+    /** Statistics so far. */
+    @NonNull
+    public SessionStats stats() {
+        return new SessionStats(Native.stats(handle));
+    }
+
+    /**
+     * Kernel ids of the threads that this session owns and computes on: none with one thread. For performance hints, together with
+     * {@link Visavis#currentThreadId()} of the thread that polls.
+     */
+    @NonNull
+    public int[] workerThreadIds() {
+        return Native.workerThreadIds(handle);
+    }
+
+    /** Ends the session; a call that is under way on another thread still ends as it should. Closing twice does nothing. */
+    @Override
+    public void close() {
+        Native.sessionClose(handle);
+    }
+
+    long handle() {
+        return handle;
+    }
+
+    private void push(int voice, FloatBuffer samples, int rate) {
+        checked(samples);
+        Native.pushBuffer(handle, voice, samples, samples.position(), samples.remaining(), rate);
+    }
+
+    private static void checked(FloatBuffer buffer) {
+        if (!buffer.isDirect()) {
+            throw new IllegalArgumentException("the buffer is not direct: use ByteBuffer.allocateDirect, or the variant for arrays");
+        }
+        if (buffer.order() != ByteOrder.nativeOrder()) {
+            throw new IllegalArgumentException("the buffer is not in native byte order: add .order(ByteOrder.nativeOrder())");
+        }
+    }
+
+    private static double seconds(long nanos) {
+        return nanos * 1e-9;
+    }
+}

@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# Checks of the C interface: header up to date, layouts, and a C program under the address sanitizer. Usage: capi/check.sh
+#
+# Needs a C compiler; as root, gcc is installed from Debian if there is none.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+if ! command -v cc >/dev/null; then
+  echo 'capi: installing gcc'
+  DEBIAN_FRONTEND=noninteractive apt-get -qq install -y --no-install-recommends gcc libc6-dev >/dev/null
+fi
+
+echo '-- tests: header, layouts, C#'
+cargo test --quiet -p visavis-capi
+echo '-- library'
+cargo build --quiet --release -p visavis-capi
+target=$(cargo metadata --no-deps --format-version 1 | sed 's/.*"target_directory":"\([^"]*\)".*/\1/')
+out=$target/capi
+mkdir -p "$out"
+
+echo '-- header alone: C11 and C++'
+for language in c c++; do
+  command -v "${language/c++/c++}" >/dev/null && [ "$language" = c ] || command -v c++ >/dev/null || { echo 'no C++ compiler: skipped'; continue; }
+  compiler=cc
+  [ "$language" = c ] || compiler=c++
+  "$compiler" -x "$language" -Wall -Wextra -Werror -pedantic -fsyntax-only -include capi/include/visavis.h - </dev/null
+done
+
+warnings=(-std=gnu11 -Wall -Wextra -Werror)
+libraries=(-lpthread -ldl -lm)
+echo '-- smoke program, shared library'
+cc "${warnings[@]}" -I capi/include capi/examples/smoke.c -o "$out/smoke" -L "$target/release" -lvisavis_c "${libraries[@]}"
+LD_LIBRARY_PATH=$target/release "$out/smoke" tests/goldens/tiny.safetensors
+echo '-- smoke program, static library, address sanitizer with leak check'
+if echo 'int main(void) { return 0; }' | cc -fsanitize=address,undefined -x c - -o "$out/probe" 2>/dev/null && "$out/probe"; then
+  cc "${warnings[@]}" -g -fsanitize=address,undefined -fno-omit-frame-pointer -I capi/include capi/examples/smoke.c -o "$out/smoke-asan" \
+    "$target/release/libvisavis_c.a" "${libraries[@]}"
+  ASAN_OPTIONS=detect_leaks=1:abort_on_error=0 "$out/smoke-asan" tests/goldens/tiny.safetensors
+else
+  echo 'skipped: this compiler has no working address sanitizer'
+fi

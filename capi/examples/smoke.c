@@ -1,0 +1,255 @@
+/* Every function of visavis.h, used as a program would and as it should not. Arguments: the bundle. Exit code 0 when all is well. */
+#include "visavis.h"
+#include <fcntl.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define CHECK(condition)                                                                                              \
+    do {                                                                                                              \
+        if (!(condition)) {                                                                                           \
+            fprintf(stderr, "%s:%d: %s (last error: %s)\n", __FILE__, __LINE__, #condition, visavis_last_error());     \
+            exit(1);                                                                                                  \
+        }                                                                                                             \
+    } while (0)
+#define OK(call) CHECK((call) == VISAVIS_STATUS_OK)
+#define REFUSED(status, call) CHECK((call) == VISAVIS_STATUS_##status && visavis_last_error()[0] != '\0')
+
+static char *read_all(const char *path, size_t *length) {
+    FILE *file = fopen(path, "rb");
+    CHECK(file && fseek(file, 0, SEEK_END) == 0);
+    *length = (size_t)ftell(file);
+    rewind(file);
+    char *bytes = malloc(*length);
+    CHECK(bytes && fread(bytes, 1, *length, file) == *length);
+    fclose(file);
+    return bytes;
+}
+
+static void loading(const char *path) {
+    visavis_engine *engine = NULL;
+    size_t length;
+    char *bytes = read_all(path, &length);
+    OK(visavis_engine_from_memory((const uint8_t *)bytes, length, &engine));
+    visavis_engine_free(engine);
+    /* Exact-sized copies: what reads beyond the end is caught by the sanitizer. */
+    for (size_t cut = 0; cut < length; cut += length / 7) {
+        uint8_t *part = malloc(cut ? cut : 1);
+        memcpy(part, bytes, cut);
+        REFUSED(BUNDLE_CORRUPT, visavis_engine_from_memory(part, cut, &engine));
+        CHECK(engine == NULL);
+        free(part);
+    }
+    memset(bytes + length - 4, 0xff, 4);
+    REFUSED(BUNDLE_CORRUPT, visavis_engine_from_memory((const uint8_t *)bytes, length, &engine));
+    free(bytes);
+
+    char apk[] = "/tmp/visavis-XXXXXX";
+    int out = mkstemp(apk), in;
+    bytes = read_all(path, &length);
+    CHECK(out >= 0 && write(out, "PK..3", 5) == 5 && write(out, bytes, length) == (ssize_t)length && write(out, "..", 2) == 2);
+    close(out);
+    free(bytes);
+    CHECK((in = open(apk, O_RDONLY)) >= 0);
+    OK(visavis_engine_from_fd(in, 5, length, &engine));
+    visavis_engine_free(engine);
+    REFUSED(BUNDLE_CORRUPT, visavis_engine_from_fd(in, 4, length, &engine));
+    REFUSED(ARGUMENT, visavis_engine_from_fd(in, 5, length + 3, &engine));
+    close(in);
+    REFUSED(IO, visavis_engine_from_fd(in, 5, length, &engine));
+    REFUSED(ARGUMENT, visavis_engine_from_fd(-1, 0, 0, &engine));
+    unlink(apk);
+
+    REFUSED(IO, visavis_engine_from_path("/nowhere/model.safetensors", &engine));
+    REFUSED(ARGUMENT, visavis_engine_from_path(NULL, &engine));
+    REFUSED(ARGUMENT, visavis_engine_from_path("\xff\xfe", &engine));
+    REFUSED(ARGUMENT, visavis_engine_from_path(path, NULL));
+    REFUSED(ARGUMENT, visavis_engine_from_memory(NULL, 1, &engine));
+}
+
+static void options_and_versions(const visavis_engine *engine) {
+    visavis_session *session = NULL;
+    visavis_session_options options;
+    OK(visavis_session_options_init(&options, sizeof options));
+    CHECK(options.struct_size == sizeof options && options.threads == 1 && isnan(options.gaze));
+    options.threads = 3;
+    REFUSED(ARGUMENT, visavis_session_new(engine, &options, &session));
+    CHECK(session == NULL);
+    OK(visavis_session_options_init(&options, sizeof options));
+    options.gaze = 2;
+    REFUSED(ARGUMENT, visavis_session_new(engine, &options, &session));
+    OK(visavis_session_options_init(&options, sizeof options));
+    options.sampler_kind = 77;
+    REFUSED(ARGUMENT, visavis_session_new(engine, &options, &session));
+    options.struct_size = 3;
+    REFUSED(ABI, visavis_session_new(engine, &options, &session));
+
+    /* A program that is newer than the library: what the library does not know must be zero. */
+    struct {
+        visavis_session_options known;
+        uint64_t more;
+    } newer;
+    OK(visavis_session_options_init(&newer.known, sizeof newer));
+    CHECK(newer.known.struct_size == sizeof newer && newer.more == 0);
+    OK(visavis_session_new(engine, &newer.known, &session));
+    visavis_session_free(session);
+    newer.more = 1;
+    REFUSED(ABI, visavis_session_new(engine, &newer.known, &session));
+
+    OK(visavis_check_abi(VISAVIS_ABI_VERSION));
+    REFUSED(ABI, visavis_check_abi(VISAVIS_ABI_VERSION + 1));
+    REFUSED(ABI, visavis_check_abi(VISAVIS_ABI_VERSION + 0x10000));
+    CHECK(visavis_abi_version() == VISAVIS_ABI_VERSION && strlen(visavis_version()) > 0);
+}
+
+/* Motion of `blocks` blocks; returns a digest. */
+static uint64_t drive(const visavis_engine *engine, uint32_t threads, int blocks) {
+    visavis_session_options options;
+    visavis_session *session = NULL;
+    OK(visavis_session_options_init(&options, sizeof options));
+    options.threads = threads;
+    options.gaze = 0.8f;
+    OK(visavis_session_new(engine, &options, &session));
+    OK(visavis_session_warm_up(session, 1));
+
+    uint32_t joints_a_frame = visavis_engine_joint_count(engine), count;
+    size_t all = VISAVIS_BLOCK_FRAMES * joints_a_frame;
+    visavis_frame frames[VISAVIS_BLOCK_FRAMES];
+    visavis_joint *joints = malloc(all * sizeof *joints);
+    float voice[4410];
+    for (int i = 0; i < 4410; i++) voice[i] = 0.2f * (float)((i * 7) % 100 - 50) / 50;
+    uint64_t digest = 0xcbf29ce484222325u;
+    for (int k = 0; k < blocks; k++) {
+        double due;
+        OK(visavis_session_next_due(session, &due));
+        OK(visavis_session_push_agent_audio(session, voice, 4410, 44100));
+        OK(visavis_session_push_user_audio(session, voice, 1600, 16000));
+        OK(visavis_session_push_user_head(session, 0.1f * (float)k, 1.6f, 1.5f, due));
+        OK(visavis_session_poll(session, due, frames, sizeof *frames, joints, all, &count));
+        CHECK(count == VISAVIS_BLOCK_FRAMES && frames[3].index == (uint64_t)(4 * k + 3));
+        for (size_t i = 0; i < all * sizeof *joints; i++) digest = (digest ^ ((const uint8_t *)joints)[i]) * 0x100000001b3u;
+        OK(visavis_session_poll(session, due, frames, sizeof *frames, joints, all, &count));
+        CHECK(count == 0);
+    }
+    visavis_stats stats = {.struct_size = sizeof stats};
+    OK(visavis_session_stats(session, &stats));
+    CHECK(stats.struct_size == sizeof stats && stats.blocks == (uint64_t)blocks && stats.head_accepted == (uint64_t)blocks);
+    CHECK(stats.cache_bytes > 0 && stats.block_ms_max > 0);
+    uint32_t ids[2];
+    size_t id_count;
+    OK(visavis_session_worker_thread_ids(session, ids, 2, &id_count));
+    CHECK(id_count == threads - 1);
+    OK(visavis_session_worker_thread_ids(session, NULL, 0, &id_count));
+
+    /* Wrong uses of a live session. */
+    REFUSED(ARGUMENT, visavis_session_poll(session, NAN, frames, sizeof *frames, joints, all, &count));
+    REFUSED(STATE, visavis_session_poll(session, 0, frames, sizeof *frames, joints, all, &count));
+    REFUSED(ARGUMENT, visavis_session_poll(session, 1e6, frames, sizeof *frames, joints, all - 1, &count));
+    REFUSED(ARGUMENT, visavis_session_poll(session, 1e6, NULL, sizeof *frames, joints, all, &count));
+    REFUSED(ABI, visavis_session_poll(session, 1e6, frames, sizeof *frames - 8, joints, all, &count));
+    REFUSED(ARGUMENT, visavis_session_poll(session, 1e6, frames, sizeof *frames, joints, all, NULL));
+    voice[3] = NAN;
+    REFUSED(AUDIO, visavis_session_push_user_audio(session, voice, 10, 16000));
+    REFUSED(AUDIO, visavis_session_push_user_audio(session, voice, 1, 7999));
+    REFUSED(ARGUMENT, visavis_session_push_user_audio(session, NULL, 1, 16000));
+    REFUSED(ARGUMENT, visavis_session_push_user_audio(session, (const float *)((const char *)voice + 1), 1, 16000));
+    REFUSED(ARGUMENT, visavis_session_push_user_audio(session, voice, SIZE_MAX, 16000));
+    REFUSED(ARGUMENT, visavis_session_set_gaze(session, NAN));
+    REFUSED(ARGUMENT, visavis_session_set_guidance(session, -1, 0));
+    REFUSED(ARGUMENT, visavis_session_set_sampler(session, VISAVIS_SAMPLER_KIND_EULER, 65));
+    REFUSED(ARGUMENT, visavis_session_finish_audio(session, 2));
+    stats.struct_size = 8;
+    REFUSED(ABI, visavis_session_stats(session, &stats));
+    OK(visavis_session_set_sampler(session, VISAVIS_SAMPLER_KIND_MIDPOINT, 2));
+    OK(visavis_session_set_natural_gaze(session));
+    OK(visavis_session_set_gaze(session, 1));
+    OK(visavis_session_set_guidance(session, 1.3f, 2));
+    OK(visavis_session_finish_audio(session, VISAVIS_VOICE_AGENT));
+    OK(visavis_session_clear_audio(session, VISAVIS_VOICE_USER));
+    OK(visavis_session_set_audio_present(session, VISAVIS_VOICE_USER, 0));
+    /* Frames alone, and a frame that a newer program believes to be larger. */
+    struct {
+        visavis_frame known;
+        uint64_t more;
+    } larger[VISAVIS_BLOCK_FRAMES];
+    OK(visavis_session_poll(session, 1e6, &larger[0].known, sizeof *larger, NULL, 0, &count));
+    CHECK(count == VISAVIS_BLOCK_FRAMES && larger[3].more == 0 && larger[3].known.index == (uint64_t)(4 * blocks + 3));
+    OK(visavis_session_reset(session));
+    free(joints);
+    visavis_session_free(session);
+    return digest;
+}
+
+static const visavis_engine *shared;
+static visavis_session *contested;
+
+static void *other_thread(void *digest) {
+    *(uint64_t *)digest = drive(shared, 1, 4);
+    return NULL;
+}
+
+static void *contend(void *busy) {
+    for (int i = 0; i < 2000; i++) {
+        visavis_status status = visavis_session_set_gaze(contested, 0.5f);
+        if (status == VISAVIS_STATUS_BUSY) ++*(int *)busy;
+        else CHECK(status == VISAVIS_STATUS_OK);
+    }
+    return NULL;
+}
+
+int main(int argc, char **argv) {
+    CHECK(argc == 2);
+    loading(argv[1]);
+    visavis_engine *engine = NULL;
+    OK(visavis_engine_from_path(argv[1], &engine));
+    options_and_versions(engine);
+
+    CHECK(strlen(visavis_engine_name(engine)) > 0 && strcmp(visavis_engine_joint_name(engine, 0), "hips") == 0);
+    CHECK(visavis_engine_joint_name(engine, 1000) == NULL && visavis_engine_joint_count(NULL) == 0);
+    int32_t parent;
+    float offset[3];
+    OK(visavis_engine_joint(engine, 0, &parent, offset));
+    CHECK(parent == -1 && offset[1] > 0.5f);
+    OK(visavis_engine_joint(engine, 1, NULL, NULL));
+    REFUSED(ARGUMENT, visavis_engine_joint(engine, 1000, &parent, offset));
+    CHECK(visavis_engine_openxr_joint(engine, 0, VISAVIS_BODY_FB) == 1);
+    CHECK(visavis_engine_openxr_joint(engine, 1000, VISAVIS_BODY_FB) == -1);
+    CHECK(visavis_engine_joint_for_openxr(engine, 1) == 0 && visavis_engine_joint_for_openxr(engine, 0) == -1);
+    CHECK(visavis_engine_joint_for_openxr(engine, 84) == -1);
+    OK(visavis_pin_current_thread(~0ull));
+    REFUSED(ARGUMENT, visavis_pin_current_thread(0));
+    CHECK(visavis_current_thread_id() != 0);
+
+    /* The same motion with one thread, two threads, and two sessions at once on one engine. */
+    uint64_t one = drive(engine, 1, 4), two = drive(engine, 2, 4), beside = 0;
+    pthread_t thread;
+    shared = engine;
+    CHECK(pthread_create(&thread, NULL, other_thread, &beside) == 0);
+    uint64_t meanwhile = drive(engine, 1, 4);
+    pthread_join(thread, NULL);
+    CHECK(one == two && one == beside && one == meanwhile);
+
+    /* Two threads in one session: each call is done or refused. */
+    int busy[2] = {0, 0};
+    OK(visavis_session_new(engine, NULL, &contested));
+    CHECK(pthread_create(&thread, NULL, contend, &busy[1]) == 0);
+    contend(&busy[0]);
+    pthread_join(thread, NULL);
+
+    /* A session outlives its engine. */
+    visavis_engine_free(engine);
+    visavis_frame frames[VISAVIS_BLOCK_FRAMES];
+    uint32_t count;
+    OK(visavis_session_poll(contested, 0, frames, sizeof *frames, NULL, 0, &count));
+    CHECK(count == VISAVIS_BLOCK_FRAMES);
+    visavis_session_free(contested);
+    visavis_session_free(NULL);
+    visavis_engine_free(NULL);
+    REFUSED(ARGUMENT, visavis_session_reset(NULL));
+    REFUSED(ARGUMENT, visavis_session_new(NULL, NULL, &contested));
+    printf("C smoke: all well; digest %016llx, %d calls refused as busy\n", (unsigned long long)one, busy[0] + busy[1]);
+    return 0;
+}

@@ -1,0 +1,72 @@
+//! Frames as C sees them.
+
+use crate::options::sampler_numbers;
+use visavis::frame::Frame;
+
+/// One frame of motion, without its joints. World coordinates: metres, right-handed, Y up.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct VisavisFrame {
+    /// Number of the frame since the session started.
+    pub index: u64,
+    /// Session time at which it is shown, seconds: index / 30.
+    pub time: f64,
+    /// Where the agent stands: floor projection of the hips.
+    pub root_x: f64,
+    /// See root_x.
+    pub root_z: f64,
+    /// Heading, radians: the agent faces (sin yaw, 0, cos yaw).
+    pub root_yaw: f64,
+    /// Position of the hips of the rig with fixed bone lengths.
+    pub hips: [f32; 3],
+    /// Largest distance between a decoded joint and the rig's, metres.
+    pub fit_error: f32,
+    /// Gaze score, -1 to 1; NaN while the user's position is not known.
+    pub gaze: f32,
+    /// What made this frame: a visavis_sampler_kind; -1: something newer.
+    pub sampler_kind: i32,
+    /// Steps of that sampler.
+    pub sampler_steps: u32,
+    /// 0.
+    pub reserved: u32,
+}
+
+/// One joint of a frame. Quaternions are x, y, z, w.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct VisavisJoint {
+    /// Rotation relative to the parent on the rig with fixed bone lengths (hips: relative to the world): for humanoid rigs.
+    pub local: [f32; 4],
+    /// Decoded position in the world.
+    pub position: [f32; 3],
+    /// Decoded rotation in the world, from the T-pose.
+    pub rotation: [f32; 4],
+}
+
+impl VisavisFrame {
+    pub(crate) fn of(f: &Frame) -> Self {
+        let (sampler_kind, sampler_steps) = sampler_numbers(f.sampler);
+        Self {
+            index: f.index,
+            time: f.time,
+            root_x: f.root.x,
+            root_z: f.root.z,
+            root_yaw: f.root.yaw,
+            hips: f.hips.to_array(),
+            fit_error: f.fit_error,
+            gaze: f.gaze.unwrap_or(f32::NAN),
+            sampler_kind,
+            sampler_steps,
+            reserved: 0,
+        }
+    }
+}
+
+/// The joints of a frame.
+pub(crate) fn joints_of(f: &Frame) -> impl Iterator<Item = VisavisJoint> {
+    f.global.iter().zip(&f.local).map(|(global, local)| VisavisJoint {
+        local: local.to_array(),
+        position: global.position.to_array(),
+        rotation: global.rotation.to_array(),
+    })
+}

@@ -1,0 +1,297 @@
+//! Sessions: one conversation.
+
+use crate::VISAVIS_BLOCK_FRAMES;
+use crate::engine::VisavisEngine;
+use crate::frames::{VisavisFrame, VisavisJoint, joints_of};
+use crate::options::{VisavisSessionOptions, sampler};
+use crate::status::{Failure, Outcome, VisavisStatus, guard};
+use crate::structs::{borrow, place, room, slice};
+use std::sync::{Mutex, TryLockError};
+use visavis::audio::Voice;
+use visavis::session::Session;
+
+/// One conversation with one user.
+pub struct VisavisSession {
+    session: Mutex<Session>,
+}
+
+/// One of the two voices.
+#[repr(i32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum VisavisVoice {
+    /// The agent's own, usually known ahead.
+    Agent = 0,
+    /// The user's, as the microphone hears it.
+    User = 1,
+}
+
+/// Runs `body` on a session that nobody else is using.
+///
+/// # Safety
+/// `session`, if neither null nor misaligned, is alive.
+pub(crate) unsafe fn with(session: *const VisavisSession, body: impl FnOnce(&mut Session) -> Outcome) -> VisavisStatus {
+    guard(|| {
+        // SAFETY: the caller's promise.
+        let session = unsafe { borrow(session, "session") }?;
+        match session.session.try_lock() {
+            Ok(mut session) => body(&mut session),
+            Err(TryLockError::WouldBlock) => Err(Failure::new(
+                VisavisStatus::Busy,
+                "another thread is inside this session: call it from one at a time",
+            )),
+            Err(TryLockError::Poisoned(_)) => Err(Failure::new(
+                VisavisStatus::Panic,
+                "this session met an internal fault before: free it and make another",
+            )),
+        }
+    })
+}
+
+fn voice(session: &mut Session, voice: i32) -> Outcome<&mut Voice> {
+    match voice {
+        0 => Ok(session.agent_voice()),
+        1 => Ok(session.user_voice()),
+        _ => Err(Failure::argument(format!("voice {voice}: see visavis_voice"))),
+    }
+}
+
+/// Starts a session on `engine`; `options` may be NULL for the defaults. All its memory is taken here.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_new(
+    engine: *const VisavisEngine,
+    options: *const VisavisSessionOptions,
+    session: *mut *mut VisavisSession,
+) -> VisavisStatus {
+    guard(|| {
+        // SAFETY: the header's promise, here and below.
+        let out = unsafe { place(session, "session") }?.write(std::ptr::null_mut());
+        // SAFETY: as above.
+        let engine = unsafe { borrow(engine, "engine") }?;
+        // SAFETY: as above.
+        let options = unsafe { VisavisSessionOptions::options(options) }?;
+        let made = VisavisSession { session: Mutex::new(engine.engine.session(options)?) };
+        *out = Box::into_raw(Box::new(made));
+        Ok(())
+    })
+}
+
+/// Frees a session.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_free(session: *mut VisavisSession) {
+    guard(|| {
+        if !session.is_null() {
+            // SAFETY: made by `visavis_session_new` and not freed before, by the ownership chapter.
+            drop(unsafe { Box::from_raw(session) });
+        }
+        Ok(())
+    });
+}
+
+/// Appends to the agent's own voice: `count` mono samples, full scale 1, of `rate` Hz (8000 to 192000), up to a minute ahead
+/// of time. More is dropped and counted. Sound that has not come when a block is computed is silence there, is counted, and
+/// is heard later. A voice that was never pushed is absent, which is not the same as silent.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_push_agent_audio(
+    session: *mut VisavisSession,
+    samples: *const f32,
+    count: usize,
+    rate: u32,
+) -> VisavisStatus {
+    // SAFETY: the header's promise, twice.
+    unsafe { with(session, |s| Ok(s.push_agent_audio(slice(samples, count, "samples")?, rate)?)) }
+}
+
+/// Appends to the user's voice, as visavis_session_push_agent_audio.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_push_user_audio(
+    session: *mut VisavisSession,
+    samples: *const f32,
+    count: usize,
+    rate: u32,
+) -> VisavisStatus {
+    // SAFETY: the header's promise, twice.
+    unsafe { with(session, |s| Ok(s.push_user_audio(slice(samples, count, "samples")?, rate)?)) }
+}
+
+/// Ends an utterance of a voice (a visavis_voice): the last milliseconds, which wait in the resampler, come out. Optional.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_finish_audio(session: *mut VisavisSession, which: i32) -> VisavisStatus {
+    let finish = |s: &mut Session| {
+        voice(s, which)?.finish();
+        Ok(())
+    };
+    // SAFETY: the header's promise.
+    unsafe { with(session, finish) }
+}
+
+/// Drops all sound of a voice (a visavis_voice) that has not been used, as when an utterance is broken off.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_clear_audio(session: *mut VisavisSession, which: i32) -> VisavisStatus {
+    let clear = |s: &mut Session| {
+        voice(s, which)?.clear();
+        Ok(())
+    };
+    // SAFETY: the header's promise.
+    unsafe { with(session, clear) }
+}
+
+/// Makes a voice (a visavis_voice) present, silent until something is pushed (`present` not 0), or absent until the next push (0).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_set_audio_present(
+    session: *mut VisavisSession,
+    which: i32,
+    present: i32,
+) -> VisavisStatus {
+    let set = |s: &mut Session| {
+        voice(s, which)?.set_present(present != 0);
+        Ok(())
+    };
+    // SAFETY: the header's promise.
+    unsafe { with(session, set) }
+}
+
+/// Tells where the user's head is (midpoint of the eyes), world metres, at `time` seconds of session time. Any rate; positions
+/// that are not finite, out of order or impossible are ignored and counted (visavis_stats).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_push_user_head(
+    session: *mut VisavisSession,
+    x: f32,
+    y: f32,
+    z: f32,
+    time: f64,
+) -> VisavisStatus {
+    // SAFETY: the header's promise.
+    unsafe { with(session, |s| Ok(s.push_user_head(glam::Vec3::new(x, y, z), time)?)) }
+}
+
+/// Sets the gaze target from the next block on: 0 averted, 1 sustained eye contact.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_set_gaze(session: *mut VisavisSession, target: f32) -> VisavisStatus {
+    // SAFETY: the header's promise.
+    unsafe { with(session, |s| Ok(s.set_gaze(Some(target))?)) }
+}
+
+/// Leaves the gaze to the model from the next block on.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_set_natural_gaze(session: *mut VisavisSession) -> VisavisStatus {
+    // SAFETY: the header's promise.
+    unsafe { with(session, |s| Ok(s.set_gaze(None)?)) }
+}
+
+/// Sets the guidance weights, 0 to 20: of the conditioning as a whole (1 is none), and of the gaze target.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_set_guidance(
+    session: *mut VisavisSession,
+    weight: f32,
+    gaze: f32,
+) -> VisavisStatus {
+    // SAFETY: the header's promise.
+    unsafe { with(session, |s| Ok(s.set_guidance(weight, gaze)?)) }
+}
+
+/// Sets the sampler from the next block on; `kind` is a visavis_sampler_kind.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_set_sampler(
+    session: *mut VisavisSession,
+    kind: i32,
+    steps: u32,
+) -> VisavisStatus {
+    // SAFETY: the header's promise.
+    unsafe { with(session, |s| Ok(s.set_sampler(sampler(kind, steps)?)?)) }
+}
+
+/// Computes the next block if it is due at `now` (session time, seconds, never running backwards). Call it until
+/// `*frame_count` is 0: a caller that comes late gets all blocks that it missed.
+///
+/// When a block is due, `*frame_count` becomes 4, and `frames[0..4]` and `joints` are filled; the joints of frame `i` start at
+/// `joints[i * visavis_engine_joint_count]`. `frame_size` is sizeof(visavis_frame); `joint_capacity`, in joints, must be
+/// at least 4 times the joint count. `joints` may be NULL with capacity 0 if only the frames are wanted. Nothing is allocated.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_poll(
+    session: *mut VisavisSession,
+    now: f64,
+    frames: *mut VisavisFrame,
+    frame_size: usize,
+    joints: *mut VisavisJoint,
+    joint_capacity: usize,
+    frame_count: *mut u32,
+) -> VisavisStatus {
+    let poll = |s: &mut Session| {
+        // SAFETY: the header's promise.
+        let count = unsafe { place(frame_count, "frame_count") }?.write(0);
+        let per_frame = s.engine().config().rig.joints.len();
+        let all = VISAVIS_BLOCK_FRAMES * per_frame;
+        if joint_capacity < all && !(joints.is_null() && joint_capacity == 0) {
+            return Err(Failure::argument(format!("joint_capacity is {joint_capacity}: a block has {all} joints")));
+        }
+        if frame_size < size_of::<VisavisFrame>() || frame_size > 4096 || frame_size % align_of::<VisavisFrame>() != 0 {
+            let message = format!("frame_size is {frame_size}: pass sizeof(visavis_frame)");
+            return Err(Failure::new(VisavisStatus::Abi, message));
+        }
+        crate::structs::check(frames, "frames")?;
+        // SAFETY: the header's promise.
+        let room_for_joints = unsafe { room(joints, if joints.is_null() { 0 } else { all }, "joints") }?;
+        let Some(made) = s.poll(now)? else { return Ok(()) };
+        let mut joints_left = room_for_joints.iter_mut();
+        for (i, frame) in made.iter().enumerate() {
+            // SAFETY: the header's promise: four frames of `frame_size` bytes, which keeps the alignment; bytes beyond
+            // what this library knows are zeroed.
+            unsafe {
+                let at = frames.cast::<u8>().add(i * frame_size);
+                at.cast::<VisavisFrame>().write(VisavisFrame::of(frame));
+                at.add(size_of::<VisavisFrame>()).write_bytes(0, frame_size - size_of::<VisavisFrame>());
+            }
+            joints_of(frame).zip(joints_left.by_ref()).for_each(|(joint, to)| _ = to.write(joint));
+        }
+        *count = made.len() as u32;
+        Ok(())
+    };
+    // SAFETY: the header's promise.
+    unsafe { with(session, poll) }
+}
+
+/// Session time at which the next block is due, seconds, into `time`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_next_due(session: *const VisavisSession, time: *mut f64) -> VisavisStatus {
+    let due = |s: &mut Session| {
+        // SAFETY: the header's promise.
+        unsafe { place(time, "time") }?.write(s.next_due());
+        Ok(())
+    };
+    // SAFETY: the header's promise.
+    unsafe { with(session, due) }
+}
+
+/// Starts anew with the options of now; session time is 0 again. Same inputs, same bits.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_reset(session: *mut VisavisSession) -> VisavisStatus {
+    // SAFETY: the header's promise.
+    unsafe { with(session, |s| Ok(s.reset()?)) }
+}
+
+/// Computes `blocks` blocks for nothing and starts anew, so that memory and CPU are warm when the first block is due.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_warm_up(session: *mut VisavisSession, blocks: u32) -> VisavisStatus {
+    // SAFETY: the header's promise.
+    unsafe { with(session, |s| Ok(s.warm_up(blocks)?)) }
+}
+
+/// Kernel ids of the threads that the session owns and computes on, for performance hints: `*count` of them, the first `capacity` into
+/// `ids`. The thread that polls computes too (visavis_current_thread_id).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_worker_thread_ids(
+    session: *const VisavisSession,
+    ids: *mut u32,
+    capacity: usize,
+    count: *mut usize,
+) -> VisavisStatus {
+    let list = |s: &mut Session| {
+        // SAFETY: the header's promise, twice.
+        let (ids, count) = unsafe { (room(ids, capacity, "ids")?, place(count, "count")?) };
+        ids.iter_mut().zip(s.worker_thread_ids()).for_each(|(to, id)| _ = to.write(id));
+        count.write(s.worker_thread_ids().count());
+        Ok(())
+    };
+    // SAFETY: the header's promise.
+    unsafe { with(session, list) }
+}

@@ -1,0 +1,112 @@
+//! Statistics.
+
+use crate::session::{VisavisSession, with};
+use crate::status::VisavisStatus;
+use crate::structs::{Sized32, sized_struct};
+use visavis::audio::VoiceStats;
+use visavis::session::SessionStats;
+
+/// Counters of a voice, 24 kHz samples unless said otherwise.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct VisavisVoiceStats {
+    /// Silence in place of sound that had not come, while the voice was present.
+    pub underrun_samples: u64,
+    /// Dropped because a minute of sound was waiting already.
+    pub overflow_samples: u64,
+    /// Clipped to 8 times full scale, input samples: a sign of integers pushed as floats.
+    pub clipped_samples: u64,
+}
+
+/// Statistics of a session since its start or reset. Set struct_size before the call.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct VisavisStats {
+    /// sizeof(visavis_stats).
+    pub struct_size: u32,
+    /// 0.
+    pub reserved: u32,
+    /// Blocks computed.
+    pub blocks: u64,
+    /// Computation time of a block over the last 4096: median, milliseconds.
+    pub block_ms_p50: f64,
+    /// 95th percentile.
+    pub block_ms_p95: f64,
+    /// 99th percentile.
+    pub block_ms_p99: f64,
+    /// Maximum.
+    pub block_ms_max: f64,
+    /// From something that the user does to the start of the first block that can answer, at most, milliseconds.
+    pub user_delay_ms: f64,
+    /// The same for the agent's own voice; 0 when it is known ahead.
+    pub agent_delay_ms: f64,
+    /// Times that recent motion was encoded anew.
+    pub anchorings: u64,
+    /// Bytes of all key-value caches.
+    pub cache_bytes: u64,
+    /// The agent's voice.
+    pub agent_voice: VisavisVoiceStats,
+    /// The user's voice.
+    pub user_voice: VisavisVoiceStats,
+    /// Head positions that were taken.
+    pub head_accepted: u64,
+    /// Ignored: not finite.
+    pub head_non_finite: u64,
+    /// Ignored: not later than the one before.
+    pub head_out_of_order: u64,
+    /// Ignored: more than 1 km from the origin, or a time of more than 10 million seconds.
+    pub head_absurd: u64,
+    /// Taken, but too far from the one before to have walked there.
+    pub head_teleports: u64,
+    /// Dropped to make room before they were asked for.
+    pub head_overwritten: u64,
+}
+
+sized_struct!(VisavisStats, "visavis_stats");
+
+impl From<VoiceStats> for VisavisVoiceStats {
+    fn from(v: VoiceStats) -> Self {
+        Self {
+            underrun_samples: v.underrun_samples,
+            overflow_samples: v.overflow_samples,
+            clipped_samples: v.clipped_samples,
+        }
+    }
+}
+
+impl From<SessionStats> for VisavisStats {
+    fn from(s: SessionStats) -> Self {
+        let [block_ms_p50, block_ms_p95, block_ms_p99, block_ms_max] = s.block_ms;
+        Self {
+            struct_size: size_of::<Self>() as u32,
+            reserved: 0,
+            blocks: s.blocks,
+            block_ms_p50,
+            block_ms_p95,
+            block_ms_p99,
+            block_ms_max,
+            user_delay_ms: s.delays.user_ms,
+            agent_delay_ms: s.delays.agent_ms,
+            anchorings: s.anchorings,
+            cache_bytes: s.cache_bytes as u64,
+            agent_voice: s.inputs.agent_voice.into(),
+            user_voice: s.inputs.user_voice.into(),
+            head_accepted: s.inputs.head.accepted,
+            head_non_finite: s.inputs.head.non_finite,
+            head_out_of_order: s.inputs.head.out_of_order,
+            head_absurd: s.inputs.head.absurd,
+            head_teleports: s.inputs.head.teleports,
+            head_overwritten: s.inputs.head.overwritten,
+        }
+    }
+}
+
+/// Fills `stats`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_stats(
+    session: *const VisavisSession,
+    stats: *mut VisavisStats,
+) -> VisavisStatus {
+    // SAFETY: the header's promise, twice.
+    unsafe { with(session, |s| VisavisStats::write(stats, &s.stats().into())) }
+}
