@@ -8,6 +8,7 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 kit=$(cd .. && pwd)/shared/android
 bundle=tests/goldens/tiny.safetensors
+export RUST_BACKTRACE=0 # tests panic on purpose
 
 if ! command -v javac >/dev/null; then
   echo 'android: installing a JDK'
@@ -31,7 +32,7 @@ compile tests "$out/stubs:$out/classes:$out/demo" android/check/java
 classpath=$out/stubs:$out/classes:$out/demo:$out/tests
 
 echo '-- Rust tests: handle table, microphone'
-cargo test --quiet -p visavis-android -p visavis-microphone
+cargo test --quiet --release -p visavis-android -p visavis-microphone
 
 run_tests() { # run_tests LOG COMMAND...: the tests pass and the JVM's JNI checker has nothing to say
   local log=$1
