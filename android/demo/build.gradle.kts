@@ -24,7 +24,7 @@ android {
         sourceCompatibility = JavaVersion.VERSION_11
         targetCompatibility = JavaVersion.VERSION_11
     }
-    // Mapped where they lie in the APK: stored, not compressed.
+    // Read where they lie in the APK: stored, not compressed.
     androidResources { noCompress += listOf("safetensors", "wav") }
     sourceSets["main"].assets.srcDir(layout.buildDirectory.dir("sampleAssets"))
 }

@@ -3,7 +3,8 @@
 use super::{CONFIG_KEY, Tensors, check};
 use crate::config::{Config, FORMAT};
 use crate::error::{Error, ErrorKind, Result};
-use memmap2::{Mmap, MmapOptions};
+#[cfg(not(target_os = "android"))]
+use memmap2::Mmap;
 use safetensors::SafeTensors;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -20,13 +21,14 @@ pub struct BundleFile<'a> {
 
 #[derive(Debug)]
 enum Bytes<'a> {
+    #[cfg(not(target_os = "android"))]
     Mapped(Mmap),
     Owned(Vec<u8>),
     Borrowed(&'a [u8]),
 }
 
 impl<'a> BundleFile<'a> {
-    /// Maps the file at `path`.
+    /// Maps the file at `path` (on Android: reads it).
     ///
     /// The file must not be changed or truncated while an engine is being loaded from it; afterwards it is not read
     /// again. [`BundleFile::from_bytes`] has no such condition.
@@ -39,7 +41,7 @@ impl<'a> BundleFile<'a> {
         Self::open_part(&File::open(path).map_err(io)?, 0, None, path)
     }
 
-    /// Maps `length` bytes from `offset` on of an open file (`None`: all that follow): a bundle that lies in another file,
+    /// Maps (on Android: reads) `length` bytes from `offset` on of an open file (`None`: all that follow): a bundle that lies in another file,
     /// such as an asset that is stored uncompressed in an APK. `name` stands for it in errors. The file may be closed
     /// afterwards; otherwise as [`BundleFile::open`].
     ///
@@ -58,12 +60,7 @@ impl<'a> BundleFile<'a> {
         if length == 0 {
             return Err(corrupt("the file is empty; fetch the bundle again").with_path(path));
         }
-        #[allow(unsafe_code, reason = "mapping a file is unsafe by nature")]
-        // SAFETY: the map is read-only and private. Should another process change the file while it is being read,
-        // the reader may see changed numbers (they are checked after copying) or, if the file shrinks, a bus error:
-        // the condition stated above.
-        let map = unsafe { MmapOptions::new().offset(offset).len(length as usize).map(file) }.map_err(io)?;
-        Ok(Self { bytes: Bytes::Mapped(map), path })
+        Ok(Self { bytes: contents(file, offset, length as usize).map_err(io)?, path })
     }
 
     /// Takes a bundle that is already in memory; `name` stands for it in errors.
@@ -93,6 +90,7 @@ impl<'a> BundleFile<'a> {
 
     fn as_slice(&self) -> &[u8] {
         match &self.bytes {
+            #[cfg(not(target_os = "android"))]
             Bytes::Mapped(map) => map,
             Bytes::Owned(bytes) => bytes,
             Bytes::Borrowed(bytes) => bytes,
@@ -135,6 +133,26 @@ impl<'a> BundleFile<'a> {
         })?;
         Ok((json, tensors))
     }
+}
+
+/// `length` bytes of `file` from `offset` on.
+#[cfg(not(target_os = "android"))]
+fn contents(file: &File, offset: u64, length: usize) -> std::io::Result<Bytes<'static>> {
+    use memmap2::MmapOptions;
+    #[allow(unsafe_code, reason = "mapping a file is unsafe by nature")]
+    // SAFETY: the map is read-only and private. Should another process change the file while it is being read,
+    // the reader may see changed numbers (they are checked after copying) or, if the file shrinks, a bus error:
+    // the condition that `BundleFile::open` states.
+    let map = unsafe { MmapOptions::new().offset(offset).len(length).map(file) }?;
+    Ok(Bytes::Mapped(map))
+}
+
+/// Read, not mapped: an app's files may be replaced under it, and a bus error would end the app.
+#[cfg(target_os = "android")]
+fn contents(file: &File, offset: u64, length: usize) -> std::io::Result<Bytes<'static>> {
+    let mut bytes = vec![0; length];
+    std::os::unix::fs::FileExt::read_exact_at(file, &mut bytes, offset)?;
+    Ok(Bytes::Owned(bytes))
 }
 
 fn parse_config(json: &str) -> Result<Config> {

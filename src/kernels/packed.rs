@@ -46,7 +46,8 @@ impl Buffer {
 
     /// Large buffers in huge pages, as far as they fill them; the system may decline, which costs speed alone.
     fn pages(bytes: usize) -> Option<Store> {
-        if bytes < HUGE {
+        // Elsewhere a mapping has nothing over the allocator.
+        if bytes < HUGE || cfg!(not(target_os = "linux")) {
             return None;
         }
         let map = MmapMut::map_anon(bytes + HUGE).ok()?;

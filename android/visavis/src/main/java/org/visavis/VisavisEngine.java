@@ -18,7 +18,7 @@ public final class VisavisEngine implements AutoCloseable {
     }
 
     /**
-     * Loads a bundle from the app's assets, without copying it. The asset must be stored uncompressed:
+     * Loads a bundle from the app's assets, where it lies in the APK. The asset must be stored uncompressed:
      * {@code androidResources { noCompress += "safetensors" }}.
      *
      * @throws IOException when there is no such asset, or it is compressed
