@@ -224,7 +224,10 @@ pub unsafe extern "C" fn visavis_session_poll(
         if joint_capacity < all && !(joints.is_null() && joint_capacity == 0) {
             return Err(Failure::argument(format!("joint_capacity is {joint_capacity}: a block has {all} joints")));
         }
-        if frame_size < size_of::<VisavisFrame>() || frame_size > 4096 || frame_size % align_of::<VisavisFrame>() != 0 {
+        if frame_size < size_of::<VisavisFrame>()
+            || frame_size > 4096
+            || !frame_size.is_multiple_of(align_of::<VisavisFrame>())
+        {
             let message = format!("frame_size is {frame_size}: pass sizeof(visavis_frame)");
             return Err(Failure::new(VisavisStatus::Abi, message));
         }

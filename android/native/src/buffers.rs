@@ -11,6 +11,7 @@ use jni::objects::{JByteBuffer, JObject};
 /// # Safety
 /// While the slice lives nobody else writes to the buffer: Java holds the session's lock or hands over a buffer of its own.
 /// A program that writes to it nevertheless reads changed numbers, which are checked after the copy that follows.
+#[expect(clippy::mut_from_ref, reason = "the memory is the Java buffer's, not the reference's")]
 pub(crate) unsafe fn elements<'a, T: Copy>(
     env: &Env<'_>,
     buffer: &'a JObject<'_>,

@@ -165,15 +165,15 @@ fn push_array<'l>(
 }
 
 fn finish_voice<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, voice: jint) -> Outcome {
-    with(session, |s| Ok(of(s, voice)?.finish()))
+    with(session, |s| of(s, voice).map(Voice::finish))
 }
 
 fn clear_voice<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, voice: jint) -> Outcome {
-    with(session, |s| Ok(of(s, voice)?.clear()))
+    with(session, |s| of(s, voice).map(Voice::clear))
 }
 
 fn set_voice_present<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, voice: jint, present: jboolean) -> Outcome {
-    with(session, |s| Ok(of(s, voice)?.set_present(present)))
+    with(session, |s| of(s, voice).map(|v| v.set_present(present)))
 }
 
 fn push_head<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, x: f32, y: f32, z: f32, time: f64) -> Outcome {
