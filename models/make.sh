@@ -5,14 +5,14 @@
 # report of f16, int8 and int4 against BUNDLE (into docs/report unless told otherwise). OTHER_MACHINE=FILE.json adds another
 # machine's numerics to the report: `visavis report ... --numerics-only FILE.json` writes them there.
 # CLIPS=DIR (clips of the training corpus) judges all four bundles with `visavis eval` too, on WINDOWS windows (16), and adds that.
-# Same bundle, same bytes.
+# VISAVIS=PROGRAM runs that instead of building one. Same bundle, same bytes.
 set -euo pipefail
 if [ $# -lt 1 ] || [ ! -f "$1" ]; then echo 'usage: models/make.sh BUNDLE [REPORT FOLDER]' >&2; exit 2; fi
 bundle=$(realpath "$1")
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 report=${2:-docs/report}
 scratch=$(mktemp -d); trap 'rm -rf "$scratch"' EXIT
-visavis() { cargo run --release --quiet -- "$@"; }
+visavis() { if [ -n "${VISAVIS:-}" ]; then "$VISAVIS" "$@"; else cargo run --release --quiet -- "$@"; fi; }
 
 reference=$scratch/reference.safetensors  # BUNDLE may be one of the files that are written here
 cp "$bundle" "$reference"

@@ -1,12 +1,12 @@
 //! Arguments.
 
+use super::quantize::QuantizeArgs;
+use super::report::ReportArgs;
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use visavis::engine::Engine;
 use visavis::frame::Sampler;
-use visavis::kernels::Scheme;
-use visavis::quant::Keep;
 use visavis::session::SessionOptions;
 
 /// A body for a virtual agent: hears both voices, sees the user's head, moves at 30 frames a second.
@@ -55,7 +55,7 @@ pub struct RunArgs {
     /// Gaze guidance weight, 0 to 20 [default: the model's]
     #[arg(long, value_name = "W", value_parser = weight, allow_negative_numbers = true)]
     pub gaze_guidance: Option<f32>,
-    /// Bundle [default: models/visavis-base.safetensors here, beside the program, or in its source folder]
+    /// Bundle [default: the shipped one, in models/ here, beside the program, or in its source folder]
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
     /// Seed of the noise: same seed and inputs, same motion
@@ -103,59 +103,6 @@ pub struct InspectArgs {
     /// Prints JSON: bytes, the whole config, every tensor
     #[arg(long)]
     pub json: bool,
-}
-
-#[derive(Debug, Args)]
-pub struct QuantizeArgs {
-    /// Bundle of floats
-    #[arg(value_name = "IN")]
-    pub input: PathBuf,
-    /// Where the quantised bundle goes
-    #[arg(value_name = "OUT")]
-    pub output: PathBuf,
-    /// f16, i8 or i4
-    #[arg(long, value_name = "SCHEME")]
-    pub scheme: Scheme,
-    /// Layers that stay floats, f16 unless told otherwise; `*` stands for any characters, the last pattern that fits decides
-    #[arg(long, value_name = "PATTERN[=f16|f32]")]
-    pub keep: Vec<Keep>,
-    /// Rounds each weight to the nearest value, instead of so that outputs on the sample conversation lose least
-    #[arg(long)]
-    pub plain: bool,
-    /// Raises the layers that hurt most until blocks of the sample conversation are within this mean joint error, millimetres
-    #[arg(long, value_name = "BUDGET_MM", value_parser = millimetres, allow_negative_numbers = true)]
-    pub auto: Option<f64>,
-}
-
-#[derive(Debug, Args)]
-pub struct ReportArgs {
-    /// Bundle of floats that the candidates were made from
-    #[arg(long, value_name = "FILE")]
-    pub reference: PathBuf,
-    /// Bundles to compare with it
-    #[arg(long, value_name = "FILE", required = true, num_args = 1..)]
-    pub candidate: Vec<PathBuf>,
-    /// Folder for report.html, report.md and report.json
-    #[arg(long, value_name = "DIR", required_unless_present = "numerics_only")]
-    pub out: Option<PathBuf>,
-    /// Length of the free runs, minutes
-    #[arg(long, value_name = "N", default_value_t = 10.0, value_parser = minutes, allow_negative_numbers = true)]
-    pub minutes: f64,
-    /// Blocks that are compared teacher-forced [default: 240, as many as the sample conversation has]
-    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<u32>::new().range(1..=10_000))]
-    pub blocks: Option<u32>,
-    /// What `visavis eval --json` wrote for the reference and for each candidate, on the same clips
-    #[arg(long, value_name = "FILE", num_args = 1..)]
-    pub eval: Vec<PathBuf>,
-    /// A few blocks of everything: to see that it works
-    #[arg(long)]
-    pub quick: bool,
-    /// Writes the numbers that do not depend on the machine, and nothing else
-    #[arg(long, value_name = "FILE")]
-    pub numerics_only: Option<PathBuf>,
-    /// Numbers that --numerics-only wrote on another machine, to be compared with this one's
-    #[arg(long, value_name = "FILE")]
-    pub other_machine: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -238,20 +185,6 @@ fn gaze(text: &str) -> Result<Gaze, String> {
 
 pub(super) fn weight(text: &str) -> Result<f32, String> {
     number(text, 0.0, 20.0)
-}
-
-fn millimetres(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(value) if value > 0.0 && value <= 1000.0 => Ok(value),
-        _ => Err("it is a number above 0, up to 1000".to_owned()),
-    }
-}
-
-fn minutes(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(value) if value > 0.0 && value <= 60.0 => Ok(value),
-        _ => Err("it is a number above 0, up to 60".to_owned()),
-    }
 }
 
 pub(super) fn number(text: &str, low: f32, high: f32) -> Result<f32, String> {

@@ -4,14 +4,18 @@ use std::path::{Path, PathBuf};
 use visavis::error::{Error, ErrorKind, Result};
 use visavis::offline::Conversation;
 
-/// The shipped bundle.
-const MODEL: &str = "models/visavis-base.safetensors";
+/// The shipped bundles; the first that is there is the default.
+const MODELS: [&str; 2] = ["models/visavis-base-i8.safetensors", "models/visavis-base.safetensors"];
 
 /// The bundle to use: `given`, else the shipped one.
 pub fn model(given: Option<&Path>) -> Result<PathBuf> {
     match given {
         Some(path) => Ok(path.to_path_buf()),
-        None => shipped(MODEL).map_err(|tried| missing("the model", &tried, "; or name a bundle with --model")),
+        None => {
+            let found = MODELS.iter().find_map(|model| shipped(model).ok());
+            let tried = || MODELS.iter().filter_map(|model| shipped(model).err()).flatten().collect::<Vec<_>>();
+            found.ok_or_else(|| missing("the model", &tried(), "; or name a bundle with --model"))
+        }
     }
 }
 

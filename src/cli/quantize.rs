@@ -1,15 +1,45 @@
 //! `visavis quantize`: a bundle of floats to int8, int4 or half floats.
 
-use super::args::QuantizeArgs;
 use super::{files, print};
+use clap::Args;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::Write as _;
+use std::path::PathBuf;
 use visavis::bundle::BundleFile;
 use visavis::error::{Error, ErrorKind, Result};
 use visavis::export::write_atomically;
 use visavis::kernels::Scheme;
-use visavis::quant::{Budget, Options, Quantised, SMALL, Scene, quantise};
+use visavis::quant::{Budget, Keep, Options, Quantised, SMALL, Scene, quantise};
+
+#[derive(Debug, Args)]
+pub struct QuantizeArgs {
+    /// Bundle of floats
+    #[arg(value_name = "IN")]
+    pub input: PathBuf,
+    /// Where the quantised bundle goes
+    #[arg(value_name = "OUT")]
+    pub output: PathBuf,
+    /// f16, i8 or i4
+    #[arg(long, value_name = "SCHEME")]
+    pub scheme: Scheme,
+    /// Layers that stay floats, f16 unless told otherwise; `*` stands for any characters, the last pattern that fits decides
+    #[arg(long, value_name = "PATTERN[=f16|f32]")]
+    pub keep: Vec<Keep>,
+    /// Rounds each weight to the nearest value, instead of so that outputs on the sample conversation lose least
+    #[arg(long)]
+    pub plain: bool,
+    /// Raises the layers that hurt most until blocks of the sample conversation are within this mean joint error, millimetres
+    #[arg(long, value_name = "BUDGET_MM", value_parser = millimetres, allow_negative_numbers = true)]
+    pub auto: Option<f64>,
+}
+
+fn millimetres(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if value > 0.0 && value <= 1000.0 => Ok(value),
+        _ => Err("it is a number above 0, up to 1000".to_owned()),
+    }
+}
 
 /// Blocks of the sample conversation that sensitivity is measured on.
 const BLOCKS: usize = 24;

@@ -1,12 +1,51 @@
 //! `visavis report`: what quantised bundles lose and what they cost.
 
-use super::args::ReportArgs;
 use super::{files, print};
+use clap::Args;
+use clap::builder::RangedU64ValueParser;
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use visavis::error::{Error, ErrorKind, Result};
 use visavis::export::write_atomically;
 use visavis::report::{self, Numerics, Options, Report};
+
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// Bundle of floats that the candidates were made from
+    #[arg(long, value_name = "FILE")]
+    pub reference: PathBuf,
+    /// Bundles to compare with it
+    #[arg(long, value_name = "FILE", required = true, num_args = 1..)]
+    pub candidate: Vec<PathBuf>,
+    /// Folder for report.html, report.md and report.json
+    #[arg(long, value_name = "DIR", required_unless_present = "numerics_only")]
+    pub out: Option<PathBuf>,
+    /// Length of the free runs, minutes
+    #[arg(long, value_name = "N", default_value_t = 10.0, value_parser = minutes, allow_negative_numbers = true)]
+    pub minutes: f64,
+    /// Blocks that are compared teacher-forced [default: 240, as many as the sample conversation has]
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<u32>::new().range(1..=10_000))]
+    pub blocks: Option<u32>,
+    /// What `visavis eval --json` wrote for the reference and for each candidate, on the same clips
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub eval: Vec<PathBuf>,
+    /// A few blocks of everything: to see that it works
+    #[arg(long)]
+    pub quick: bool,
+    /// Writes the numbers that do not depend on the machine, and nothing else
+    #[arg(long, value_name = "FILE")]
+    pub numerics_only: Option<PathBuf>,
+    /// Numbers that --numerics-only wrote on another machine, to be compared with this one's
+    #[arg(long, value_name = "FILE")]
+    pub other_machine: Option<PathBuf>,
+}
+
+fn minutes(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if value > 0.0 && value <= 60.0 => Ok(value),
+        _ => Err("it is a number above 0, up to 60".to_owned()),
+    }
+}
 
 pub fn run(args: &ReportArgs) -> Result<()> {
     let progress = |what: &str| {

@@ -10,7 +10,8 @@
 use super::Rounder;
 use super::keep::Keep;
 use super::layers::Layer;
-use super::teacher::{Scene, Teacher};
+use super::scene::Scene;
+use super::teacher::Teacher;
 use super::write;
 use crate::bundle::{BundleFile, StoredWeights};
 use crate::engine::Engine;

@@ -1,7 +1,8 @@
 //! Second moments of what flows into each layer, of a reference run over a conversation.
 
 use super::nearest_plane::factor;
-use super::teacher::{Scene, Teacher};
+use super::scene::Scene;
+use super::teacher::Teacher;
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::frame::Sampler;

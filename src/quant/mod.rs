@@ -7,6 +7,7 @@
 //! | `round` | rounding to each scheme, with the scale that loses least |
 //! | `nearest_plane` | rounding by activation statistics |
 //! | `calibration` | those statistics, of a reference run over a conversation |
+//! | `scene`, `walker` | a conversation in blocks, and an engine driven block by block |
 //! | `teacher` | what quantisation does to a block: teacher-forced runs of two engines side by side |
 //! | `auto` | the scheme of each layer by measured sensitivity |
 //! | `write` | putting the bundle together |
@@ -21,9 +22,11 @@ mod keep;
 mod layers;
 mod nearest_plane;
 mod round;
+mod scene;
 mod teacher;
 #[cfg(test)]
 mod tests;
+mod walker;
 mod write;
 
 pub use auto::{Budget, Choice};
@@ -31,7 +34,8 @@ pub use calibration::Calibration;
 pub use keep::Keep;
 pub use layers::{Layer, SMALL, default_scheme, layers};
 pub use round::{round, sqnr_db};
-pub use teacher::{Forced, FrameError, Scene, Teacher};
+pub use scene::Scene;
+pub use teacher::{Forced, FrameError, Teacher};
 
 use crate::bundle::{BundleFile, StoredWeights, Tensors};
 use crate::config::{Config, Quantisation};

@@ -1,9 +1,11 @@
 //! From what was measured to a document.
 
-use super::chart::{bars, lines, number};
+mod motion;
+
+use super::chart::{bars, number};
 use super::document::Document;
 use super::spread::Spread;
-use super::{Blocks, Measures, Numerics, Report};
+use super::{Blocks, Numerics, Report};
 
 /// The whole report.
 pub(super) fn document(report: &Report) -> Document {
@@ -23,9 +25,9 @@ pub(super) fn document(report: &Report) -> Document {
     ));
     in_short(report, &mut d);
     targets(report, &mut d);
-    blocks(report, &mut d);
-    free(report, &mut d);
-    judged(report, &mut d);
+    motion::blocks(report, &mut d);
+    motion::free(report, &mut d);
+    motion::judged(report, &mut d);
     speed(report, &mut d);
     machines(report, &mut d);
     tensors(report, &mut d);
@@ -81,127 +83,6 @@ fn targets(report: &Report, d: &mut Document) {
         "The worst of all rows counts. The change of FGD is that of the distance to recorded motion (evaluations below); where no \
          evaluation was given, the free runs tell each candidate's distance from the reference's motion beside what another seed alone changes.",
     );
-}
-
-fn blocks(report: &Report, d: &mut Document) {
-    d.heading(2, "Teacher-forced blocks");
-    let mut rows = Vec::new();
-    for c in &report.numerics.candidates {
-        for b in &c.blocks {
-            let mut row = vec![c.name.clone(), b.sampler.clone(), b.frames.to_string()];
-            row.extend(four(&b.mm));
-            row.extend(four(&b.degrees));
-            row.extend([number(b.gaze.mean), number(b.gaze.p99), db(b.latent_sqnr_db)]);
-            row.extend([number(b.round_trip_mm.mean), number(b.round_trip_mm.p99)]);
-            rows.push(row);
-        }
-    }
-    let head = [
-        "bundle",
-        "sampler",
-        "frames",
-        "mm mean",
-        "p50",
-        "p99",
-        "max",
-        "deg mean",
-        "p50",
-        "p99",
-        "max",
-        "gaze mean",
-        "p99",
-        "latents dB",
-        "VAE mm mean",
-        "p99",
-    ];
-    d.table(&head, rows);
-    d.text(
-        "Joints: distance and angle to the reference's, over all joints and frames. VAE: the reference's motion through encoder and \
-         decoder, against the reference's own, which is what re-anchoring sees.",
-    );
-    let first: Vec<(&String, &Blocks)> =
-        report.numerics.candidates.iter().filter_map(|c| Some((&c.name, c.blocks.first()?))).collect();
-    let Some((_, some)) = first.first() else { return };
-    let names: Vec<String> = some.joints.iter().map(|j| j.joint.clone()).collect();
-    let series: Vec<_> =
-        first.iter().map(|(n, b)| ((*n).clone(), b.joints.iter().map(|j| j.mm.mean).collect())).collect();
-    d.picture(bars(&names, &series, "mean mm"), format!("Mean position error by joint, {}", some.sampler));
-    for (name, b) in first {
-        d.heading(3, format!("{name} by joint, {}", b.sampler));
-        let rows = b.joints.iter().map(|j| {
-            let mut row = vec![j.joint.clone()];
-            row.extend(four(&j.mm));
-            row.extend(four(&j.degrees));
-            row
-        });
-        d.table(&["joint", "mm mean", "p50", "p99", "max", "deg mean", "p50", "p99", "max"], rows.collect());
-    }
-}
-
-fn free(report: &Report, d: &mut Document) {
-    let f = &report.free;
-    d.heading(2, "Free-running sessions");
-    d.text(format!(
-        "{:.1} minutes of the sample conversation, repeated, with the default sampler and re-anchoring. Sessions from equal noise part \
-         because each block builds on the one before; their distributions have to agree. FGD is the Frechet distance of poses (m²) and of \
-         accelerations ((m/s²)²) from the reference's run. The row with another seed tells how much chance alone changes.",
-        f.minutes
-    ));
-    let all: Vec<&Measures> = [&f.reference, &f.other_seed].into_iter().chain(&f.candidates).collect();
-    let opt = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), number);
-    let rows = all.iter().map(|m| {
-        let s = &m.summary;
-        vec![
-            m.name.clone(),
-            opt(m.fgd),
-            opt(m.fgd_acceleration),
-            opt(s.head_angle),
-            opt(s.wrist_speed),
-            opt(s.speaking.and_then(|s| s.wrist_speed)),
-            opt(s.non_speaking.and_then(|s| s.wrist_speed)),
-            opt(s.foot_slide),
-            opt(s.support_foot_speed),
-            opt(s.seam),
-            opt(s.max_fit_error),
-            number(m.posture_mm.mean),
-            m.anchorings.to_string(),
-        ]
-    });
-    let head = [
-        "run",
-        "FGD",
-        "FGD acc",
-        "gaze",
-        "wrist m/s",
-        "speaking",
-        "not",
-        "foot slide",
-        "support m/s",
-        "seam",
-        "max fit m",
-        "posture apart, mm",
-        "re-anchored",
-    ];
-    d.table(&head, rows.collect());
-    let series: Vec<_> = all[1..].iter().map(|m| (m.name.clone(), m.divergence_mm.clone())).collect();
-    d.picture(
-        lines(&series, f.minutes, "minutes", "mean mm apart"),
-        "Distance of the joints from the reference's over time",
-    );
-}
-
-fn judged(report: &Report, d: &mut Document) {
-    d.heading(2, "Evaluations on recorded conversations");
-    let Some(judged) = &report.judged else {
-        d.text("Not given in this run: `visavis eval --model FILE --clips DIR --json FILE.json` for each bundle, then --eval here.");
-        return;
-    };
-    let rows = judged.metrics.iter().map(|(name, values)| {
-        let value = |v: &Option<f64>| v.map_or_else(|| "-".to_owned(), number);
-        std::iter::once(name.clone()).chain(values.iter().map(value)).collect()
-    });
-    let files = judged.files.iter().map(String::as_str);
-    d.table(&std::iter::once("metric").chain(files).collect::<Vec<_>>(), rows.collect());
 }
 
 fn speed(report: &Report, d: &mut Document) {
