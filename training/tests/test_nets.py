@@ -141,3 +141,13 @@ def test_bundle_round_trip_and_goldens(tmp_path):
     assert out["x1.3"].shape == (8, 3, 8) and out["positions"].shape == (16, 22, 3)
     assert all(torch.isfinite(v.float()).all() for v in out.values())
     assert (out["x1.3"][:, 1] - out["x1.3"][:, 2]).abs().max() > 1e-3
+
+
+def test_a_student_sees_history_at_its_own_time_whatever_the_sampler_s_defaults():
+    from visavis_train.nets.stream import Stream
+    tensors, config = make_tiny.build()
+    net = bundle.load_net("student", bundle.flow_from(config["flow"], config["vae"]["latent"], 8), tensors)
+    stream = Stream(net, 1, tau_history=0.9, clean_from=0.3, single=True)
+    assert stream.past(0.0) == 0.9
+    late = Stream(net, 1, tau_history=0.9, clean_from=0.3)
+    assert [late.past(t) for t in (0.0, 0.25, 0.375, 0.95)] == [0.0, 0.25, 0.9, 0.95]

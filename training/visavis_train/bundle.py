@@ -13,7 +13,7 @@ from .nets.flow import FlowNet
 from .nets.vae import Vae
 
 FORMAT = 1
-SESSION = {"guidance": 2.0, "gaze_guidance": 1.5, "temperature": 0.75, "clean_history": {"tau": 0.9, "from": 0.3}, "anchor_period": 90,
+SESSION = {"guidance": 1.5, "gaze_guidance": 2.0, "temperature": 0.75, "clean_history": {"tau": 0.9, "from": 0.3}, "anchor_period": 90,
            "anchor_radius": 8.0}
 KEY = "visavis"
 

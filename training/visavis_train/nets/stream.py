@@ -92,11 +92,12 @@ class Stream:
     """Streams `batch` sequences at once. Time of network evaluations is proportional to the rows, not to the history."""
 
     def __init__(self, net, batch, guidance=1.3, gaze_guidance=2.5, gaze=False, steps=4, tau_history=None, clean_from=0.0, single=False):
-        """`single`: the network is a single-step student, one branch. `tau_history`, `clean_from`: see `history_time`."""
+        """`single`: the network is a single-step student, one branch, history always at `tau_history`. `tau_history`,
+        `clean_from`: see `history_time`."""
         if single and tau_history is None:
             raise ValueError("a single-step student needs tau_history")
         self.net, self.batch, self.steps, self.single = net, batch, steps, single
-        self.past = lambda tau: history_time(tau, tau_history, clean_from)
+        self.past = lambda tau: history_time(tau, tau_history, 0.0 if single else clean_from)
         self.guidance, self.gaze_guidance, self.gaze = guidance, gaze_guidance, gaze
         self.count = 1 if single else (3 if gaze else 2)
         slots = 1 if single else 2 * steps

@@ -51,7 +51,7 @@ def roll(b, batch, target=None, student=False, steps=4, seed=0, guidance=None, g
     g = torch.Generator().manual_seed(seed)
     n, session = len(batch), b.config["session"]
     latent, width = b.config["vae"]["latent"], b.config["audio"]["features"]
-    clean = session.get("clean_history") or {"tau": None, "from": 0.0}
+    clean = (None if student else session.get("clean_history")) or {"tau": None, "from": 0.0}
     tau_history, clean_from = clean["tau"] if tau_history is None else tau_history, clean["from"] if clean_from is None else clean_from
     stream = Stream(b.student if student else b.flow, n, session["guidance"] if guidance is None else guidance,
                     session["gaze_guidance"] if gaze_guidance is None else gaze_guidance, target is not None, steps,

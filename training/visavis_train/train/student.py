@@ -100,8 +100,8 @@ def main():
     parser.add_argument("--reuse", type=int, default=4, help="student updates for each teacher pass")
     parser.add_argument("--own", type=float, default=0.5, help="share of teacher passes over the student's own roll-outs")
     parser.add_argument("--tau-history", type=float, default=0.9)
-    parser.add_argument("--guidance", type=float, default=2.0)
-    parser.add_argument("--gaze-guidance", type=float, default=1.5)
+    parser.add_argument("--guidance", type=float, default=1.5)
+    parser.add_argument("--gaze-guidance", type=float, default=2.0)
     parser.add_argument("--clean-from", type=float, default=0.3,
                         help="the teacher imputes history below this flow time and sees it at --tau-history from there; above 1: always imputed")
     parser.add_argument("--temperature", type=float, default=0.75, help="scale of the noise, as sessions use it")
