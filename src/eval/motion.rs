@@ -18,8 +18,11 @@ pub(super) fn generate(
     [agent, user]: [Option<Vec<f32>>; 2],
     head: impl IntoIterator<Item = Vec3>,
 ) -> Result<Outcome> {
-    let points = head.into_iter().enumerate().map(|(i, p)| (i as f64 / f64::from(FPS), p));
-    let talk = Conversation::new(agent, user, Some(UserPath::from_points(points.collect())?))?;
+    let at = |i: usize| i as f64 / f64::from(FPS);
+    let mut points: Vec<_> = head.into_iter().enumerate().map(|(i, p)| (at(i), p)).collect();
+    // A path ends with its last point; the last frame has a length too.
+    points.extend(points.last().map(|(_, p)| (at(points.len()), *p)));
+    let talk = Conversation::new(agent, user, Some(UserPath::from_points(points)?))?;
     run(&mut engine.session(options)?, &talk, &mut |_| {})
 }
 

@@ -95,6 +95,16 @@ fn spoilt_motion_is_told_from_the_corpus() {
 }
 
 #[test]
+fn windows_without_voices_have_all_their_frames() {
+    let engine = tiny();
+    let clips = made_up(&engine.config().rig, &talk());
+    let mut window = Window::choose(&clips, 1).unwrap().remove(0);
+    (window.segment.agent_voice, window.segment.user_voice) = (None, None);
+    let options = SessionOptions { sampler: Sampler::Single, ..Default::default() };
+    assert_eq!(motion::in_window(&engine, &options, &window).unwrap().len(), WINDOW);
+}
+
+#[test]
 fn windows_do_not_overlap_and_spread() {
     let engine = tiny();
     let clips = made_up(&engine.config().rig, &talk());
