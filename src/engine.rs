@@ -1,7 +1,7 @@
 //! The engine: a loaded bundle, immutable, shared by any number of sessions.
 
 use crate::audio::{AudioEncoder, AudioWeights};
-use crate::bundle::{AudioSource, BundleFile, Tensors};
+use crate::bundle::{AudioSource, BundleFile, LoadMode, Tensors};
 use crate::config::Config;
 use crate::error::{Error, ErrorKind, Result};
 use crate::flow::{ConditionLayout, FlowNet};
@@ -12,6 +12,9 @@ use crate::session::{Session, SessionOptions};
 use crate::vae::{Decoder, Encoder};
 use std::path::Path;
 use std::sync::Arc;
+
+/// Most frames of an idle clip: every session starts by going through them.
+const MAX_IDLE_FRAMES: usize = 3600;
 
 /// A loaded model: networks packed for this CPU, rig and statistics. Immutable and shared; all that changes is in
 /// [`Session`].
@@ -61,7 +64,15 @@ impl Engine {
     /// [`ErrorKind::Io`], [`ErrorKind::BundleCorrupt`], [`ErrorKind::BundleVersion`], [`ErrorKind::BundleInvalid`],
     /// each naming the file; [`ErrorKind::CpuLevel`].
     pub fn load(path: impl AsRef<Path>) -> Result<Arc<Self>> {
-        Self::from_file(&BundleFile::open(path)?, Kernels::detect()?)
+        Self::load_with(path, LoadMode::Map)
+    }
+
+    /// As [`Engine::load`], mapping the file or copying it first: [`LoadMode`] tells what each of them survives.
+    ///
+    /// # Errors
+    /// As [`Engine::load`].
+    pub fn load_with(path: impl AsRef<Path>, mode: LoadMode) -> Result<Arc<Self>> {
+        Self::from_file(&BundleFile::open_with(path, mode)?, Kernels::detect()?)
     }
 
     /// Loads a bundle from memory; `name` stands for it in errors.
@@ -95,8 +106,10 @@ impl Engine {
         let latent = config.vae.latent;
         let layout = ConditionLayout { audio_features: config.audio.features };
         let (idle_frames, idle) = t.f32_rows("idle.frames", features)?;
-        if idle_frames % BLOCK_FRAMES != 0 {
-            let message = format!("tensor idle.frames has {idle_frames} frames, not a multiple of {BLOCK_FRAMES}");
+        if idle_frames % BLOCK_FRAMES != 0 || idle_frames > MAX_IDLE_FRAMES {
+            let message = format!(
+                "tensor idle.frames has {idle_frames} frames, not a multiple of {BLOCK_FRAMES} up to {MAX_IDLE_FRAMES}"
+            );
             return Err(Error::new(ErrorKind::BundleInvalid, message));
         }
         let net = |prefix| FlowNet::load(t, kernels, &config.flow, latent, layout, prefix);
@@ -224,6 +237,11 @@ impl Standard {
         for ((x, m), s) in x.iter_mut().zip(&self.mean).zip(&self.std) {
             *x = (*x - m) / s;
         }
+    }
+
+    /// `(x - mean) / std`, row by row, in place.
+    pub(crate) fn standardise_all(&self, x: &mut [f32]) {
+        x.chunks_exact_mut(self.mean.len()).for_each(|row| self.standardise_in_place(row));
     }
 
     /// `x std + mean`, row by row, in place.

@@ -107,6 +107,9 @@ pub struct Frame {
     pub gaze: Option<f32>,
     /// What made this frame.
     pub sampler: Sampler,
+    /// How much of the frame is a held pose instead of the model's, 0 to 1: while the model cannot keep up, or gave what no
+    /// body can do, and in the cross-fade after that.
+    pub held: f32,
 }
 
 impl Frame {
@@ -122,6 +125,7 @@ impl Frame {
             fit_error: 0.0,
             gaze: None,
             sampler: Sampler::Midpoint(4),
+            held: 0.0,
         }
     }
 }

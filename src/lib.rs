@@ -1,6 +1,8 @@
 #![doc = include_str!("../README.md")]
+#![cfg_attr(visavis_rtsan, feature(sanitize))]
 
 pub mod audio;
+mod bounded;
 pub mod bundle;
 pub mod config;
 pub mod engine;
@@ -21,6 +23,7 @@ pub mod quant;
 pub mod recording;
 pub mod report;
 pub mod session;
+pub mod soak;
 pub mod trace;
 pub mod user;
 pub mod vae;

@@ -32,7 +32,8 @@ fn stages(golden: &Golden, sampler: Sampler, cache: KvDtype) -> BTreeMap<&'stati
 fn stages_with(golden: &Golden, options: SessionOptions) -> BTreeMap<&'static str, Vec<f32>> {
     let engine = tiny();
     let gaze = Some(golden.values("gaze")[0]);
-    let options = SessionOptions { gaze, anchoring: Anchoring::Never, bridge: false, stance: false, ..options };
+    let options =
+        SessionOptions { gaze, anchoring: Anchoring::Never, bridge: false, stance: false, guard: false, ..options };
     let mut session = engine.session(options).expect("session");
     let mut noise = golden.values("eps_idle");
     noise.extend(golden.values("eps"));

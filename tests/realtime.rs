@@ -9,7 +9,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use visavis::frame::Sampler;
 use visavis::kernels::Scheme;
-use visavis::session::{Anchoring, SessionOptions};
+use visavis::session::{Anchoring, Budget, Governor, Hold, SessionOptions};
 
 /// The system's allocator, counting what is asked of it while `WATCH` is set.
 struct Counting;
@@ -56,8 +56,9 @@ fn allocations(work: impl FnOnce()) -> u64 {
     CALLS.load(Ordering::SeqCst)
 }
 
-/// Every sampler, one and two threads, gaze on and off, sampler changes with their catching up, re-anchoring, voices of
-/// a rate that is resampled, weights of every scheme: after the first push of each voice, neither pushing nor computing allocates.
+/// Every sampler, one and two threads, gaze on and off, sampler changes with their catching up, re-anchoring, the governor,
+/// voices of a rate that is resampled, weights of every scheme: after the first push of each voice, neither pushing nor
+/// computing allocates.
 #[test]
 fn a_running_session_does_not_allocate() {
     assert!(allocations(|| drop(std::hint::black_box(vec![1u8]))) > 0, "the allocator counts");
@@ -91,5 +92,26 @@ fn a_running_session_does_not_allocate() {
         });
         assert_eq!(calls, 0, "allocations with {threads} threads");
         assert!(session.stats().anchorings > 0, "re-anchoring was among what ran");
+
+        // The governor with all it does: down the ladder, holding, rehearsing, catching up, and its record of that.
+        session.set_sampler(Sampler::Midpoint(4)).unwrap();
+        session.set_governor(Governor::Budget(Budget::default())).unwrap();
+        let calls = allocations(|| {
+            for block in 0..300 {
+                std::hint::black_box(session.poll(session.next_due()).unwrap().unwrap());
+                let holds = session.decisions().last().unwrap().plan.hold != Hold::No;
+                let ms = if holds {
+                    0.5
+                } else if (60..100).contains(&block) {
+                    150.0
+                } else {
+                    14.0
+                };
+                session.report_block_time(ms).unwrap();
+            }
+        });
+        assert_eq!(calls, 0, "allocations under the governor with {threads} threads");
+        let stats = session.stats().governor;
+        assert!(stats.held_blocks > 0 && stats.catch_up_passes > 0, "{stats:?}");
     }
 }

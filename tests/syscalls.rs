@@ -12,7 +12,7 @@ mod common;
 
 use common::{Inputs, tiny};
 use visavis::frame::Sampler;
-use visavis::session::{Session, SessionOptions};
+use visavis::session::{Budget, Governor, Session, SessionOptions};
 
 /// What became of a child that ran `work` under the filter.
 #[derive(Debug, PartialEq)]
@@ -107,4 +107,15 @@ fn blocks_make_no_system_call() {
         fate => assert_eq!(fate, Fate::Killed, "a system call is fatal in the child"),
     }
     assert_eq!(confined(|| compute(&mut session, 40)), Fate::Through);
+
+    session.set_governor(Governor::Budget(Budget::default())).unwrap();
+    let governed = |session: &mut Session| {
+        for block in 0..80 {
+            let now = session.next_due();
+            let ok = session.poll(now).is_ok_and(|frames| frames.is_some());
+            let ms = if (10..30).contains(&block) { 150.0 } else { 5.0 };
+            std::hint::black_box(ok && session.report_block_time(ms).is_ok());
+        }
+    };
+    assert_eq!(confined(|| governed(&mut session)), Fate::Through);
 }

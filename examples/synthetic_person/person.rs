@@ -138,9 +138,9 @@ pub fn recording(seconds: f32) -> Recording {
             global,
             hips,
             local,
-            fit_error: 0.0,
             gaze: Some(gaze),
             sampler,
+            ..Frame::empty(0)
         });
     }
     let samples = count * FRAME_SAMPLES;

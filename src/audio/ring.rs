@@ -72,8 +72,8 @@ impl Ring {
         self.end = self.start;
     }
 
-    /// Empty, at index 0.
-    pub(super) fn reset(&mut self) {
-        (self.start, self.end) = (0, 0);
+    /// Empty, at index `at`.
+    pub(super) fn reset(&mut self, at: u64) {
+        (self.start, self.end) = (at, at);
     }
 }

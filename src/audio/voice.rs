@@ -161,7 +161,12 @@ impl Voice {
 
     /// Absent, empty and at time 0, as when new.
     pub fn reset(&mut self) {
-        self.ring.reset();
+        self.reset_at(0);
+    }
+
+    /// Absent and empty; the next sound that is pushed belongs to block `block` and those after it.
+    pub fn reset_at(&mut self, block: u64) {
+        self.ring.reset(block * BLOCK_SAMPLES as u64);
         (self.resampler, self.lag, self.present, self.stats) = (None, 0, false, VoiceStats::default());
     }
 }

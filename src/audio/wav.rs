@@ -7,6 +7,8 @@ use std::path::Path;
 
 /// Most channels that are mixed down.
 const MAX_CHANNELS: u16 = 8;
+/// Longest file that is read, bytes.
+const MAX_BYTES: u64 = 1 << 30;
 
 /// A sound read from a file: mono, at the file's own rate.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,14 +20,15 @@ pub struct Wav {
 }
 
 impl Wav {
-    /// Reads `path`: PCM of 8, 16, 24 or 32 bits or 32-bit float, one to eight channels (averaged), 8 to 192 kHz.
+    /// Reads `path`: PCM of 8, 16, 24 or 32 bits or 32-bit float, one to eight channels (averaged), 8 to 192 kHz, at most
+    /// 1 GiB.
     ///
     /// # Errors
     /// [`ErrorKind::Io`] when the file cannot be read; [`ErrorKind::Audio`], naming the file, when it is empty, not WAV,
     /// of a format not listed above, cut off (fewer samples than its header says), or holds NaN or infinity.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|e| Error::io("read the sound file", path, e))?;
+        let bytes = crate::bounded::read(path, MAX_BYTES).map_err(|e| Error::io("read the sound file", path, e))?;
         Self::parse(&bytes).map_err(|e| e.with_path(path))
     }
 

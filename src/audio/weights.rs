@@ -95,7 +95,7 @@ pub fn check_audio_config(config: &AudioConfig) -> Result<()> {
         for (what, n) in [("inputs", inputs), ("outputs", outputs), ("kernel", kernel), ("stride", stride)] {
             size(format!("audio.layers[{i}].{what}"), n)?;
         }
-        size(format!("audio.layers[{i}].kernel * inputs"), kernel * inputs)?;
+        size(format!("audio.layers[{i}].kernel * inputs"), kernel.saturating_mul(inputs))?;
         if inputs != channels {
             return Err(invalid(format!("audio.layers[{i}] takes {inputs} channels of {channels} that come in")));
         }

@@ -1,9 +1,18 @@
-//! Ranges of a config. They bound what an engine allocates before any tensor has been looked at.
+//! Ranges of a config. They bound what an engine and its sessions allocate before any tensor has been looked at.
+//!
+//! Weights are bounded by the file's own size, since each tensor must have the shape that the config gives. Caches and scratch are not,
+//! so what a session would take is counted and must not exceed [`MAX_SESSION`].
 
 use super::file::invalid;
 use crate::audio::check_audio_config;
 use crate::config::Config;
 use crate::error::Result;
+use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES};
+use crate::pose::feature_count;
+
+/// Most memory that a session may take for caches and scratch, bytes. Sessions of the shipped model take 20 MB, those of a
+/// model of the size in the SARAH paper 60 MB.
+const MAX_SESSION: u128 = 1 << 30;
 
 /// Checks every number of `config` against its range.
 pub(super) fn config(c: &Config) -> Result<()> {
@@ -55,7 +64,38 @@ pub(super) fn config(c: &Config) -> Result<()> {
     }
     real("session.bridge", c.session.bridge, 0.0, 30.0)?;
     within("session.anchor_period", c.session.anchor_period as usize, 0, 1 << 20)?;
-    real("session.anchor_radius", c.session.anchor_radius, 0.1, 1e6)
+    real("session.anchor_radius", c.session.anchor_radius, 0.1, 1e6)?;
+    let bytes = session_bytes(c);
+    if bytes > MAX_SESSION {
+        let (mib, most) = (bytes >> 20, MAX_SESSION >> 20);
+        return Err(invalid(format!(
+            "a session of this model would take {mib} MiB, more than {most}: the config's widths, layers or windows are wrong; \
+             export the bundle again"
+        )));
+    }
+    Ok(())
+}
+
+/// Bytes that a session takes at most, caches in f32; slots of their own that Euler samplers ask for come on top.
+fn session_bytes(c: &Config) -> u128 {
+    let product = |factors: &[usize]| factors.iter().map(|n| *n as u128).product::<u128>();
+    let (v, w) = (&c.vae, &c.flow);
+    let features = feature_count(c.rig.joints.len());
+    // Keys and values of eight slots with three branches and of the student.
+    let flow = product(&[2, 25, w.layers, w.window_blocks + 8, w.width]);
+    // Encoder, two decoders; six tokens a block.
+    let vae = product(&[2, 3, v.layers, 6 * v.window_blocks, v.width]);
+    let tokens = product(&[w.window_blocks + 9, 2 * v.latent + 8 + 8 * c.audio.features + 2 * w.width]);
+    let anchor = product(&[w.window_blocks + 1, BLOCK_FRAMES * features + v.latent]);
+    let rows = product(&[27, w.width, 12 + w.mlp]) + product(&[6, v.width, 12 + v.mlp]);
+    let modulation = product(&[9, 2, 6 * w.layers + 2, w.width]);
+    let mut audio = 0;
+    let mut samples = BLOCK_SAMPLES;
+    for layer in &c.audio.layers {
+        audio += product(&[samples + layer.kernel, layer.inputs]) + product(&[64, layer.kernel, layer.inputs]);
+        samples /= layer.stride;
+    }
+    4 * (flow + vae + tokens + anchor + rows + modulation + 2 * audio)
 }
 
 fn width(name: &str, width: usize, heads: usize) -> Result<()> {

@@ -10,7 +10,23 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// Largest header that is parsed, bytes: metadata of thousands of tensors take well under one mebibyte.
-const MAX_HEADER: u64 = 16 << 20;
+const MAX_HEADER: u64 = 4 << 20;
+/// Longest file that is copied to memory, bytes.
+const MAX_COPY: u64 = 4 << 30;
+
+/// How a bundle's file is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum LoadMode {
+    /// Mapped: pages are read as they are needed and belong to the system's cache. The file must not be changed or cut while it
+    /// is being loaded: numbers that change are checked like any others, but **a file that is cut while it is mapped
+    /// kills the process** with a bus error (`SIGBUS`) where the system has mapped files at all. Replacing it by a rename, as installers do, is fine: the
+    /// mapped file lives on. Once an engine has been made, its file is not read again.
+    #[default]
+    Map,
+    /// Copied to memory first, and read once: whatever happens to the file, the outcome is an engine or a typed error. Takes
+    /// the file's size of memory while loading. For files that others may write to.
+    Copy,
+}
 
 /// An opened bundle: its bytes, with the container already checked.
 #[derive(Debug)]
@@ -28,15 +44,24 @@ enum Bytes<'a> {
 }
 
 impl<'a> BundleFile<'a> {
-    /// Maps the file at `path` (on Android: reads it).
-    ///
-    /// The file must not be changed or truncated while an engine is being loaded from it; afterwards it is not read
-    /// again. [`BundleFile::from_bytes`] has no such condition.
+    /// Maps the file at `path` (on Android: reads it): see [`LoadMode::Map`] for what must not happen to it meanwhile.
     ///
     /// # Errors
     /// [`ErrorKind::Io`] when it cannot be opened or mapped.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        Self::open_with(path, LoadMode::Map)
+    }
+
+    /// Maps or copies the file at `path`.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Io`] when it cannot be opened, mapped or read, or is longer than 4 GiB and to be copied.
+    pub fn open_with(path: impl AsRef<Path>, mode: LoadMode) -> Result<Self> {
         let path = path.as_ref();
+        if mode == LoadMode::Copy {
+            let bytes = crate::bounded::read(path, MAX_COPY).map_err(|e| Error::io("read the bundle", path, e))?;
+            return Ok(Self::from_bytes(bytes, path));
+        }
         let io = |e| Error::io("open the bundle", path, e);
         Self::open_part(&File::open(path).map_err(io)?, 0, None, path)
     }
@@ -142,7 +167,7 @@ fn contents(file: &File, offset: u64, length: usize) -> std::io::Result<Bytes<'s
     #[allow(unsafe_code, reason = "mapping a file is unsafe by nature")]
     // SAFETY: the map is read-only and private. Should another process change the file while it is being read,
     // the reader may see changed numbers (they are checked after copying) or, if the file shrinks, a bus error:
-    // the condition that `BundleFile::open` states.
+    // the condition that `LoadMode::Map` states.
     let map = unsafe { MmapOptions::new().offset(offset).len(length).map(file) }?;
     Ok(Bytes::Mapped(map))
 }

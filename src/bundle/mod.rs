@@ -12,7 +12,7 @@ mod tensors;
 
 pub use audio::AudioSource;
 pub use contents::{Contents, TensorInfo};
-pub use file::BundleFile;
+pub use file::{BundleFile, LoadMode};
 pub use stored::{StoredData, StoredWeights};
 pub use tensors::Tensors;
 

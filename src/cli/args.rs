@@ -33,6 +33,8 @@ pub enum Command {
     Report(ReportArgs),
     /// Judges a bundle on recorded conversations: motion, gaze, reaction, endurance, against targets
     Eval(super::eval::EvalArgs),
+    /// Drives a session through hours of motion and judges memory, allocations, drift and precision
+    Soak(super::soak::SoakArgs),
     /// Runs given conditioning and noise through a bundle and writes every stage
     Trace(TraceArgs),
 }

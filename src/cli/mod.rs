@@ -2,6 +2,7 @@
 //!
 //! Exit codes: 0 done, 1 an error (one line on stderr, `visavis: ...`), 2 wrong usage.
 
+mod allocations;
 mod args;
 mod demo;
 mod eval;
@@ -11,6 +12,7 @@ mod inspect;
 mod progress;
 mod quantize;
 mod report;
+mod soak;
 mod trace;
 
 use args::{Cli, Command, DemoArgs};
@@ -29,6 +31,7 @@ pub fn main() -> ExitCode {
             Command::Quantize(args) => quantize::run(&args),
             Command::Report(args) => report::run(&args),
             Command::Eval(args) => eval::run(&args),
+            Command::Soak(args) => soak::run(&args),
             Command::Trace(args) => trace::run(&args),
         },
         Err(e) => return usage(&e),

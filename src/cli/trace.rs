@@ -21,6 +21,7 @@ pub fn run(args: &TraceArgs) -> Result<()> {
         anchoring: Anchoring::Never,
         bridge: false,
         stance: false,
+        guard: false,
         ..SessionOptions::default()
     };
     let trace = trace(&engine, &input, options)?;

@@ -30,6 +30,8 @@ pub struct Endurance {
     pub changes: Vec<Change>,
     /// Whether every frame was finite.
     pub finite: bool,
+    /// Times that the plausibility guard had to hold a pose, a minute of motion.
+    pub trips_a_minute: f64,
     /// The agent's mean distance from where it started, in the last period, metres.
     pub wandered: f64,
 }
@@ -88,7 +90,7 @@ impl Endurance {
             let user: Vec<Vec3> = (0..length * periods).map(|i| circling(i % length, length)).collect();
             let options = SessionOptions { start: Root::default(), seed: run as u64, ..options.clone() };
             let outcome = generate(engine, options, voices, user)?;
-            Ok(Run::of(&outcome.recording, length))
+            Ok(Run { trips: outcome.stats.guard.trips, ..Run::of(&outcome.recording, length) })
         })?;
         let metric = |(name, value, least): &Metric| {
             let mean =
@@ -101,6 +103,8 @@ impl Endurance {
             runs,
             changes: METRICS.iter().filter_map(metric).collect(),
             finite: results.iter().all(|run| run.finite),
+            trips_a_minute: results.iter().map(|run| run.trips as f64).sum::<f64>() * 60.0
+                / (runs * period * periods) as f64,
             wandered: results.iter().map(|run| run.wandered).sum::<f64>() / runs as f64,
         })
     }
@@ -110,6 +114,7 @@ struct Run {
     first: Summary,
     last: Summary,
     finite: bool,
+    trips: u64,
     wandered: f64,
 }
 
@@ -135,6 +140,7 @@ impl Run {
             first: part(LEAD, length),
             last: part(last + LEAD, frames.len()),
             finite: frames.iter().all(finite),
+            trips: 0,
             wandered: frames[last..].iter().map(away).sum::<f64>() / length as f64,
         }
     }

@@ -5,6 +5,7 @@ use super::figures::Row;
 use super::reaction::Reaction;
 use super::reconstruction::Reconstruction;
 use super::{Dial, Report};
+use crate::pose::DEFECTIVE_TRIPS_A_MINUTE;
 use serde::Serialize;
 
 /// A target and where the model stands.
@@ -140,6 +141,12 @@ fn endurance(e: &Endurance) -> Vec<Verdict> {
             Some(within),
         ),
         verdict("endurance: no NaN", "none".into(), if e.finite { "none" } else { "some" }.into(), Some(e.finite)),
+        verdict(
+            "endurance: plausibility guard, trips a minute",
+            format!("at most {DEFECTIVE_TRIPS_A_MINUTE}; above it the bundle is defective"),
+            format!("{:.2}", e.trips_a_minute),
+            Some(e.trips_a_minute <= DEFECTIVE_TRIPS_A_MINUTE),
+        ),
         at_most("endurance: bone lengths before fitting", "within 0.015 on average", bones, 0.015),
     ]
 }

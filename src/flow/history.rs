@@ -8,6 +8,7 @@ use super::{Condition, ConditionLayout};
 pub struct History {
     capacity: usize,
     latent: usize,
+    first: u64,
     len: u64,
     z: Vec<f32>,
     eps: Vec<f32>,
@@ -20,6 +21,7 @@ impl History {
         Self {
             capacity,
             latent,
+            first: 0,
             len: 0,
             z: vec![0.0; capacity * latent],
             eps: vec![0.0; capacity * latent],
@@ -27,19 +29,24 @@ impl History {
         }
     }
 
-    /// Forgets all tokens.
-    pub fn reset(&mut self) {
-        self.len = 0;
+    /// Forgets all tokens; the next one gets the index `first`.
+    pub fn reset(&mut self, first: u64) {
+        (self.first, self.len) = (first, first);
     }
 
-    /// Number of finished tokens, which is the index of the token being made.
+    /// Index of the token being made: that of the first token and the number of finished ones.
     pub fn len(&self) -> u64 {
         self.len
     }
 
     /// Whether no token is finished yet.
     pub fn is_empty(&self) -> bool {
-        self.len == 0
+        self.len == self.first
+    }
+
+    /// Index of the first token that there ever was.
+    pub fn first(&self) -> u64 {
+        self.first
     }
 
     /// Sets the conditioning of the token being made and hands out its noise to be filled.

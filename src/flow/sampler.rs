@@ -90,11 +90,17 @@ impl Generator {
         }
     }
 
-    /// Forgets all tokens.
-    pub fn reset(&mut self) {
-        self.history.reset();
-        self.reference.reset();
-        self.student.iter_mut().for_each(Slots::reset);
+    /// Forgets all tokens; the next one gets the index `first`.
+    pub fn reset(&mut self, first: u64) {
+        self.history.reset(first);
+        self.forget();
+    }
+
+    /// Forgets what the caches hold, which is what the network remembers; the tokens stay.
+    pub fn forget(&mut self) {
+        let next = self.history.len();
+        self.reference.reset(next);
+        self.student.iter_mut().for_each(|slots| slots.reset(next));
     }
 
     /// The tokens so far.
@@ -130,17 +136,76 @@ impl Generator {
         }
     }
 
-    /// Number of slots of both networks, for [`Generator::refill`].
+    /// Number of slots of both networks, those of the student last.
     pub fn slot_count(&self) -> usize {
         self.reference.len() + self.student.as_ref().map_or(0, Slots::len)
     }
 
-    /// Fills slot `slot` anew from the history (re-anchoring spreads this over blocks).
-    pub fn refill(&mut self, exec: &mut Exec, net: &FlowNet, student: Option<&FlowNet>, slot: usize) {
+    /// Computes a piece of slot `slot` anew from the history, as [`Slots::rewrite`]: tokens from `from` on, none before
+    /// `oldest`; returns the token to go on with.
+    pub fn rewrite(
+        &mut self,
+        exec: &mut Exec,
+        net: &FlowNet,
+        student: Option<&FlowNet>,
+        slot: usize,
+        oldest: u64,
+        from: u64,
+    ) -> Option<u64> {
         if slot < self.reference.len() {
-            self.reference.refill(exec, net, &self.history, slot);
-        } else if let (Some(slots), Some(net)) = (&mut self.student, student) {
-            slots.refill(exec, net, &self.history, slot - self.reference.len());
+            return self.reference.rewrite(exec, net, &self.history, slot, oldest, from);
+        }
+        let (slots, net) = self.student.as_mut().zip(student)?;
+        slots.rewrite(exec, net, &self.history, slot - self.reference.len(), oldest, from)
+    }
+
+    /// Slots that `sampler` visits, in order; empty for one that is not supported.
+    pub fn visits(&self, sampler: Sampler) -> impl Iterator<Item = usize> + '_ {
+        let (steps, student) = match sampler {
+            Sampler::Midpoint(n) => (2 * u16::from(n), None),
+            Sampler::Euler(n) => (u16::from(n), None),
+            Sampler::Single => (0, self.student.as_ref().map(|_| self.reference.len())),
+        };
+        let slot = move |i| self.taus.iter().position(|t| *t == f32::from(i) / f32::from(steps));
+        (0..steps).filter_map(slot).chain(student)
+    }
+
+    /// Finished tokens that slot `slot` lacks; 1 when it was used for the last token.
+    pub fn behind(&self, slot: usize) -> u64 {
+        match slot.checked_sub(self.reference.len()) {
+            None => self.reference.behind(slot, self.history.len()),
+            Some(slot) => self.student.as_ref().map_or(0, |slots| slots.behind(slot, self.history.len())),
+        }
+    }
+
+    /// Brings the slot of `sampler` that is furthest behind nearer to the present by one pass.
+    pub fn catch_up(&mut self, exec: &mut Exec, net: &FlowNet, student: Option<&FlowNet>, sampler: Sampler) {
+        let Some(slot) = self.visits(sampler).max_by_key(|slot| self.behind(*slot)) else { return };
+        match slot.checked_sub(self.reference.len()) {
+            None => self.reference.catch_up_once(exec, net, &self.history, slot),
+            Some(slot) => {
+                if let Some((slots, net)) = self.student.as_mut().zip(student) {
+                    slots.catch_up_once(exec, net, &self.history, slot);
+                }
+            }
+        }
+    }
+
+    /// Evaluates the network of `sampler` once for the token that would be next and keeps nothing of it: what a step takes
+    /// can be measured without making motion.
+    pub fn rehearse(
+        &mut self,
+        exec: &mut Exec,
+        net: &FlowNet,
+        student: Option<&FlowNet>,
+        sampler: Sampler,
+        condition: &Condition,
+    ) {
+        self.history.begin(condition).fill(0.0);
+        self.z.fill(0.0);
+        match (sampler, student, &mut self.student) {
+            (Sampler::Single, Some(net), Some(slots)) => slots.rehearse(exec, net, &self.history, &self.z),
+            _ => self.reference.rehearse(exec, net, &self.history, &self.z),
         }
     }
 

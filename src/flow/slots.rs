@@ -103,10 +103,10 @@ impl Slots {
         }
     }
 
-    /// Forgets all tokens.
-    pub fn reset(&mut self) {
-        self.projected_end = 0;
-        self.slots.iter_mut().for_each(|s| (s.committed, s.start) = (0, 0));
+    /// Forgets all tokens; the next one has the index `next`.
+    pub fn reset(&mut self, next: u64) {
+        self.projected_end = next;
+        self.slots.iter_mut().for_each(|s| (s.committed, s.start) = (next, next));
     }
 
     /// Bytes of the caches.
@@ -133,11 +133,44 @@ impl Slots {
         }
     }
 
-    /// Forgets what slot `slot` holds and fills it again from the last `window` tokens of `history`.
-    pub fn refill(&mut self, exec: &mut Exec, net: &FlowNet, history: &History, slot: usize) {
-        let start = history.len().saturating_sub(self.window);
-        (self.slots[slot].start, self.slots[slot].committed) = (start, start);
-        self.catch_up(exec, net, history, slot);
+    /// Brings slot `slot` nearer to the finished tokens of `history` by one pass.
+    pub fn catch_up_once(&mut self, exec: &mut Exec, net: &FlowNet, history: &History, slot: usize) {
+        let end = history.len();
+        if self.pending(slot, end) > 0 {
+            let first = self.slots[slot].committed;
+            self.pass(exec, net, history, slot, first..end.min(first + CHUNK), None);
+        }
+    }
+
+    /// Finished tokens that slot `slot` lacks, a window at most, when `end` tokens are finished.
+    pub fn behind(&self, slot: usize, end: u64) -> u64 {
+        (end - self.slots[slot].committed.min(end)).min(self.window)
+    }
+
+    /// Computes the keys and values of tokens `from..` (at most [`CHUNK`] of them, none before `oldest`) of slot `slot` anew,
+    /// in place, seeing nothing before `oldest`; returns the token to go on with, or `None` when the slot is through.
+    /// The rest of the slot stays as it is, so it can be used between two of these passes.
+    pub fn rewrite(
+        &mut self,
+        exec: &mut Exec,
+        net: &FlowNet,
+        history: &History,
+        slot: usize,
+        oldest: u64,
+        from: u64,
+    ) -> Option<u64> {
+        let Slot { committed, start, .. } = self.slots[slot];
+        let window_start = history.len().saturating_sub(self.window);
+        let from = from.max(oldest).max(window_start).max(start);
+        let to = committed.min(from + CHUNK);
+        if from >= to {
+            return None;
+        }
+        self.slots[slot].start = oldest.max(start);
+        self.pass(exec, net, history, slot, from..to, None);
+        self.slots[slot].committed = committed;
+        self.slots[slot].start = start;
+        (to < committed).then_some(to)
     }
 
     /// x1 predictions for the new token at `z`, `[branches, latent]`, over the history that slot `slot` holds; what the
@@ -151,6 +184,13 @@ impl Slots {
         let first = self.slots[slot].committed;
         self.pass(exec, net, history, slot, first..end, Some(z));
         &self.x1
+    }
+
+    /// Evaluates slot 0 for the new token and forgets it again.
+    pub fn rehearse(&mut self, exec: &mut Exec, net: &FlowNet, history: &History, z: &[f32]) {
+        self.evaluate(exec, net, history, 0, z);
+        // The token's conditioning will be another one when it is made.
+        self.projected_end = self.projected_end.min(history.len());
     }
 
     /// Tokens that slot `slot` lacks. One that lags by more than a window starts anew a window back.

@@ -1,6 +1,7 @@
 //! Feature vectors to world transforms and back.
 
 use super::bridge::Bridge;
+use super::guard::{Guard, GuardStats};
 use super::icosahedron::{decode, encode};
 use super::stance::Stance;
 use super::{Fit, Rig};
@@ -38,9 +39,14 @@ pub struct Decoder {
     fit: Fit,
     bridge: Option<Bridge>,
     stance: Option<Stance>,
+    guard: Guard,
+    /// Whether poses are judged; else the guard only holds.
+    guarded: bool,
     kernels: Kernels,
     /// Joints of a block's frames, each frame's in its heading frame, `[4, J]`.
     joints: Vec<Transform>,
+    /// The root's step to each of them.
+    steps: [[f32; ROOT_CHANNELS]; BLOCK_FRAMES],
     maps: Vec<[f32; 9]>,
     rotations: Vec<[f32; 9]>,
     /// World rotations of the frame before, for the signs of the quaternions.
@@ -57,8 +63,11 @@ impl Decoder {
             fit: Fit::new(kernels, rig),
             bridge: None,
             stance: None,
+            guard: Guard::new(rig),
+            guarded: false,
             kernels,
             joints: vec![Transform::IDENTITY; BLOCK_FRAMES * n],
+            steps: [[0.0; ROOT_CHANNELS]; BLOCK_FRAMES],
             maps: vec![[0.0; 9]; BLOCK_FRAMES * n],
             rotations: vec![[0.0; 9]; BLOCK_FRAMES * n],
             previous: vec![Quat::IDENTITY; n],
@@ -79,6 +88,18 @@ impl Decoder {
         self
     }
 
+    /// The same with frames that no body could show replaced (`guard.rs`); decoding then never fails.
+    #[must_use]
+    pub fn with_guard(mut self) -> Self {
+        self.guarded = true;
+        self
+    }
+
+    /// What the guard met since the last reset.
+    pub fn guard_stats(&self) -> GuardStats {
+        self.guard.stats()
+    }
+
     /// Length F of a feature vector.
     pub fn feature_count(&self) -> usize {
         feature_count(self.previous.len())
@@ -95,11 +116,23 @@ impl Decoder {
         self.fit.reset();
         self.bridge.iter_mut().for_each(Bridge::reset);
         self.stance.iter_mut().for_each(Stance::reset);
+        self.guard.reset();
         self.previous.fill(Quat::IDENTITY);
     }
 
-    /// Decodes the next frame: advances the root and fills `root`, `global`, `hips`, `local` and `fit_error` of `frame`;
-    /// its other fields are left alone.
+    /// Takes the pose of `x`, one feature vector, for the one before the first frame: it is held where the first one is not
+    /// plausible.
+    ///
+    /// # Panics
+    /// If `x` is not F long.
+    pub fn prime(&mut self, x: &[f32]) {
+        assert_eq!(x.len(), self.feature_count(), "a feature vector has 3 + 36 J values");
+        self.transforms(x);
+        self.guard.prime(&self.joints[..self.previous.len()]);
+    }
+
+    /// Decodes the next frame: advances the root and fills `root`, `global`, `hips`, `local`, `fit_error` and `held` of
+    /// `frame`; its other fields are left alone.
     ///
     /// # Errors
     /// As [`Decoder::decode_block`].
@@ -111,10 +144,12 @@ impl Decoder {
     }
 
     /// Decodes the next block of up to four frames, `x` `[frames, F]`, as [`Decoder::decode`] does one. Between the features and the
-    /// frames, in this order: the border to the block before is bridged, then planted feet are held.
+    /// frames, in this order: what is not plausible is replaced, the border to the block before is bridged, then planted feet are
+    /// held.
     ///
     /// # Errors
-    /// [`ErrorKind::State`] if a value of `x` is not finite; the decoder is then as before and `frames` untouched.
+    /// [`ErrorKind::State`] if a value of `x` is not finite and there is no guard; the decoder is then as before and `frames`
+    /// untouched.
     ///
     /// # Panics
     /// If there are more than four frames, or `x` does not have as many vectors of length F.
@@ -122,32 +157,77 @@ impl Decoder {
         let (n, width) = (self.previous.len(), self.feature_count());
         assert!(frames.len() <= BLOCK_FRAMES, "a block has at most four frames");
         assert_eq!(x.len(), width * frames.len(), "a feature vector has 3 + 36 J values");
-        if !x.iter().all(|v| v.is_finite()) {
+        if !self.guarded && !x.iter().all(|v| v.is_finite()) {
             return Err(Error::new(
                 ErrorKind::State,
                 "the model gave a pose that is not finite; reset the session, and check the bundle if it happens again",
             ));
         }
         self.transforms(x);
-        let step = |i: usize| [0, 1, 2].map(|c| x[i * width + c]);
+        for (i, frame) in frames.iter_mut().enumerate() {
+            self.steps[i] = [0, 1, 2].map(|c| x[i * width + c]);
+            let joints = &mut self.joints[i * n..(i + 1) * n];
+            frame.held = if self.guarded { self.guard.check(joints, &mut self.steps[i]) } else { 0.0 };
+        }
+        self.show(frames);
+        Ok(())
+    }
+
+    /// Up to four frames without features: motion eases into a held, breathing pose. Decoding goes on from there in a
+    /// cross-fade, as if there had been no time between.
+    ///
+    /// # Panics
+    /// If there are more than four frames.
+    pub fn hold_block(&mut self, frames: &mut [Frame]) {
+        let n = self.previous.len();
+        for (i, frame) in frames.iter_mut().enumerate() {
+            self.guard.hold(&mut self.joints[i * n..(i + 1) * n], &mut self.steps[i]);
+            frame.held = 1.0;
+        }
+        self.show(frames);
+    }
+
+    /// Makes `frames` of `joints` and `steps`.
+    fn show(&mut self, frames: &mut [Frame]) {
+        let n = self.previous.len();
         if let Some(bridge) = &mut self.bridge
             && !frames.is_empty()
         {
             let second = (frames.len() > 1).then(|| &self.joints[n..2 * n]);
-            bridge.start(&self.joints[..n], second, step(0));
+            bridge.start(&self.joints[..n], second, self.steps[0]);
         }
-        for (i, frame) in frames.iter_mut().enumerate() {
+        for (i, (frame, step)) in frames.iter_mut().zip(&mut self.steps).enumerate() {
             let joints = &mut self.joints[i * n..(i + 1) * n];
-            let mut step = step(i);
             if let Some(bridge) = &mut self.bridge {
-                bridge.apply(joints, &mut step);
+                bridge.apply(joints, step);
             }
-            let [vx, vz, dyaw] = self.stance.as_mut().map_or(step, |stance| stance.hold(joints, step));
+            if let Some(stance) = &mut self.stance {
+                *step = stance.hold(joints, *step);
+            }
+            let [vx, vz, dyaw] = *step;
             self.root = self.root.advanced(vx, vz, dyaw);
             place(joints, &self.root, &mut self.previous, frame);
             self.fit.fit(joints, &self.root, frame);
         }
-        Ok(())
+    }
+
+    /// Writes the feature vectors of the last block as it was shown, `x` `[frames, F]`.
+    ///
+    /// # Panics
+    /// If `x` does not have up to four vectors of length F.
+    pub fn shown(&self, x: &mut [f32]) {
+        let (n, width) = (self.previous.len(), self.feature_count());
+        assert!(
+            x.len().is_multiple_of(width) && x.len() <= BLOCK_FRAMES * width,
+            "up to four vectors of 3 + 36 J values"
+        );
+        for ((x, joints), step) in x.chunks_exact_mut(width).zip(self.joints.chunks_exact(n)).zip(&self.steps) {
+            let (head, vertices) = x.split_at_mut(ROOT_CHANNELS);
+            head.copy_from_slice(step);
+            for (joint, vertices) in joints.iter().zip(vertices.as_chunks_mut::<JOINT_CHANNELS>().0) {
+                encode(joint, self.radius, vertices);
+            }
+        }
     }
 
     /// Fills the first of `joints` from the feature vectors in `x`.

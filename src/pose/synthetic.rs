@@ -1,7 +1,7 @@
 //! Procedural motion for tests: somebody who walks in a circle, gestures and looks around.
 
 use super::{Rig, gaze_score, root_of};
-use crate::frame::{FPS, FRAME_SAMPLES, Frame, Sampler, Transform};
+use crate::frame::{FPS, FRAME_SAMPLES, Frame, Transform};
 use crate::recording::Recording;
 use glam::{Quat, Vec3};
 
@@ -44,7 +44,7 @@ fn frame(rig: &Rig, i: usize, user: Option<Vec3>) -> Frame {
     let root = root_of(&global[0], 0.0);
     let head = rig.index("head").expect("reference rig");
     let gaze = user.and_then(|u| gaze_score(rig, &global[head], u));
-    Frame { index: i as u64, time: t, root, global, hips, local, fit_error: 0.0, gaze, sampler: Sampler::Midpoint(4) }
+    Frame { index: i as u64, time: t, root, global, hips, local, gaze, ..Frame::empty(0) }
 }
 
 fn rotation(name: &str, phase: f32, t: f32) -> Quat {

@@ -7,10 +7,12 @@
 //!
 //! 1. *encode*: the encoder runs through the decoded frames of the last flow window, a few blocks at a time, until it has
 //!    caught up with the present;
-//! 2. *replace*: the new latents take the old ones' place in the history; slot caches are refilled one a block (a slot
-//!    that is still to come keeps the old latents' keys, which describe the same motion);
+//! 2. *replace*: the new latents take the old ones' place in the history; slot caches are computed anew, a few passes of
+//!    eight tokens a block (what is still to come keeps the old latents' keys, which describe the same motion);
 //! 3. *decode*: a second decoder state runs through the new latents until it has caught up; then both decode the same
 //!    latent once, and the four frames are cross-faded from the one to the other.
+//!
+//! A block that has no time for its share gives the round up; a new one starts when there is time.
 
 use super::options::{Anchoring, SessionOptions};
 use crate::engine::Engine;
@@ -21,16 +23,29 @@ use crate::vae::{DecoderState, EncoderState};
 
 /// Blocks that are encoded, or decoded, in one block's time.
 const BLOCKS_A_STEP: u64 = 3;
+/// Passes over a slot cache in one block's time.
+const PASSES_A_STEP: usize = 2;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
     Rest,
     /// The next block to encode.
     Encode(u64),
-    /// The next slot to refill.
-    Refill(usize),
+    /// The next slot to refill, and the token to go on with.
+    Refill(usize, u64),
     /// The next block to decode.
     Decode(u64),
+}
+
+/// What a block does for re-anchoring.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Share {
+    /// Blocks that are encoded.
+    pub(super) encoded: u64,
+    /// Passes of eight tokens over a slot.
+    pub(super) passes: u64,
+    /// Blocks that are decoded.
+    pub(super) decoded: u64,
 }
 
 #[derive(Debug)]
@@ -40,8 +55,12 @@ pub(super) struct Anchor {
     phase: Phase,
     /// Blocks remembered so far; block numbers here count the idle clip's blocks too, as tokens do.
     blocks: u64,
+    /// Number of the first block.
+    first: u64,
     started: u64,
     anchored_at: u64,
+    /// Asked for before it is due.
+    requested: bool,
     anchor: Root,
     encoder: EncoderState,
     /// The decoder that takes over.
@@ -71,8 +90,10 @@ impl Anchor {
             radius: f64::from(engine.config.session.anchor_radius),
             phase: Phase::Rest,
             blocks: 0,
+            first: 0,
             started: 0,
             anchored_at: 0,
+            requested: false,
             anchor: options.start,
             encoder: engine.encoder.state(options.cache),
             next: engine.decoder.state(options.cache),
@@ -87,9 +108,34 @@ impl Anchor {
         }
     }
 
-    pub(super) fn reset(&mut self, start: Root) {
-        (self.phase, self.blocks, self.started, self.anchored_at) = (Phase::Rest, 0, 0, 0);
+    /// Forgets everything; the next block gets the number `first`.
+    pub(super) fn reset(&mut self, start: Root, first: u64) {
+        (self.phase, self.requested) = (Phase::Rest, false);
+        (self.first, self.blocks, self.started, self.anchored_at) = (first, first, first, first);
         (self.anchor, self.count) = (start, 0);
+    }
+
+    /// Starts a round as soon as there is time, because what the history holds is not what was shown.
+    pub(super) fn request(&mut self) {
+        (self.phase, self.requested) = (Phase::Rest, true);
+    }
+
+    /// Replaces the features (standardised) of the block that was remembered last.
+    pub(super) fn amend(&mut self, features: &[f32]) {
+        if let Some(last) = self.blocks.checked_sub(1) {
+            let at = self.slot(last) * self.width;
+            self.features[at..][..self.width].copy_from_slice(features);
+        }
+    }
+
+    /// What the next block will do, at most.
+    pub(super) fn share(&self) -> Share {
+        match self.phase {
+            Phase::Rest => Share::default(),
+            Phase::Encode(_) => Share { encoded: BLOCKS_A_STEP, ..Share::default() },
+            Phase::Refill(..) => Share { passes: PASSES_A_STEP as u64, ..Share::default() },
+            Phase::Decode(_) => Share { decoded: BLOCKS_A_STEP + 1, ..Share::default() },
+        }
     }
 
     /// Times that the session has re-anchored.
@@ -119,9 +165,14 @@ impl Anchor {
         latent: &[f32],
         features: &mut [f32],
         root: &Root,
+        time: bool,
     ) {
         if self.period == 0 {
             return;
+        }
+        if !time {
+            self.phase = Phase::Rest;
+            return self.remember(features);
         }
         // The block that was just made: `latent` is its token's, `features` are its frames.
         let current = self.blocks;
@@ -132,26 +183,35 @@ impl Anchor {
                 (from..to).for_each(|block| self.encode(exec, engine, block));
                 self.phase = Phase::Encode(to);
                 if to == current {
-                    for block in self.started.max(current - (self.capacity - 1).min(current))..current {
+                    self.started = self.started.max(current.saturating_sub(self.capacity - 1));
+                    for block in self.started..current {
                         let at = self.slot(block) * self.latent;
                         self.z.copy_from_slice(&self.latents[at..][..self.latent]);
                         engine.latent.standardise_in_place(&mut self.z);
                         generator.history_mut().replace(block, &self.z);
                     }
-                    self.phase = Phase::Refill(0);
+                    self.phase = Phase::Refill(0, self.started);
                 }
             }
-            Phase::Refill(slot) => {
-                generator.refill(exec, &engine.flow, engine.student.as_ref(), slot);
-                self.phase = match slot + 1 {
-                    done if done == generator.slot_count() => {
-                        // As much past as the decoder sees, and no more than the history is sure to hold.
-                        let window = engine.config.vae.window_blocks.min(engine.config.flow.window_blocks) as u64;
-                        self.next.reset();
-                        Phase::Decode(current.saturating_sub(window))
+            Phase::Refill(mut slot, mut from) => {
+                for _ in 0..PASSES_A_STEP {
+                    if slot >= generator.slot_count() {
+                        break;
                     }
-                    next => Phase::Refill(next),
-                };
+                    let student = engine.student.as_ref();
+                    match generator.rewrite(exec, &engine.flow, student, slot, self.started, from) {
+                        Some(next) => from = next,
+                        None => (slot, from) = (slot + 1, self.started),
+                    }
+                }
+                self.phase = Phase::Refill(slot, from);
+                if slot >= generator.slot_count() {
+                    // As much past as the decoder sees, and no more than the history is sure to hold.
+                    let window = engine.config.vae.window_blocks.min(engine.config.flow.window_blocks) as u64;
+                    let from = current.saturating_sub(window).max(self.first);
+                    self.next.reset(from);
+                    self.phase = Phase::Decode(from);
+                }
             }
             Phase::Decode(from) => {
                 let to = current.min(from + BLOCKS_A_STEP);
@@ -175,9 +235,10 @@ impl Anchor {
 
     fn consider(&mut self, root: &Root) {
         let far = libm::hypot(root.x - self.anchor.x, root.z - self.anchor.z) > self.radius;
-        if far || self.blocks >= self.anchored_at + self.period {
-            self.started = self.blocks.saturating_sub(self.capacity - 1);
-            self.encoder.reset();
+        if far || self.requested || self.blocks >= self.anchored_at + self.period {
+            self.requested = false;
+            self.started = self.blocks.saturating_sub(self.capacity - 1).max(self.first);
+            self.encoder.reset(self.started);
             self.phase = Phase::Encode(self.started);
         }
     }

@@ -2,6 +2,7 @@
 
 use super::SessionOptions;
 use super::anchor::Anchor;
+use super::governor::{Hold, Outlook, Plan, Work};
 use super::inputs::Inputs;
 use super::probe::{Probe, tell};
 use crate::engine::Engine;
@@ -11,6 +12,9 @@ use crate::frame::{BLOCK_FRAMES, FPS, Frame, Sampler};
 use crate::kernels::Exec;
 use crate::pose::{self, gaze_score};
 use crate::vae::DecoderState;
+
+/// Standardised latents are of unit scale; what is this far out, or not a number, is no latent.
+const MAX_LATENT: f32 = 1000.0;
 
 /// Where the noise of tokens comes from.
 #[derive(Debug)]
@@ -28,7 +32,8 @@ pub(super) struct BlockState {
     generator: Generator,
     decoder: DecoderState,
     pub(super) anchor: Anchor,
-    motion: pose::Decoder,
+    pub(super) motion: pose::Decoder,
+    pub(super) work: Work,
     head: usize,
     pub(super) noise: Noise,
     /// The latent, unstandardised.
@@ -59,12 +64,16 @@ impl BlockState {
         if options.bridge && engine.config.session.bridge > 0.0 {
             motion = motion.with_bridge(rig, engine.config.session.bridge);
         }
+        if options.guard {
+            motion = motion.with_guard();
+        }
         let mut state = Self {
             inputs: Inputs::new(engine, options)?,
             generator,
             decoder: engine.decoder.state(options.cache),
             anchor: Anchor::new(engine, options),
-            motion: if options.stance { motion.with_stance(rig) } else { motion },
+            motion,
+            work: Work::new(&engine.config),
             head: rig.index("head").unwrap_or(0),
             noise: Noise::Seeded,
             latent: vec![0.0; engine.config.vae.latent],
@@ -79,18 +88,18 @@ impl BlockState {
 
     /// Back to the start: the idle clip as history, the agent where the options put it.
     pub(super) fn reset(&mut self, engine: &Engine, options: &SessionOptions) -> Result<()> {
-        self.block = 0;
-        self.inputs.reset();
-        self.generator.reset();
-        self.decoder.reset();
-        self.anchor.reset(options.start);
+        self.block = options.first_block;
+        self.inputs.reset(self.block);
+        self.generator.reset(self.block);
+        self.decoder.reset(self.block);
+        self.anchor.reset(options.start, self.block);
         self.motion.reset(options.start);
         let temperature = options.temperature(engine);
         let absent = &self.inputs.condition;
         self.exec.begin();
         for z in engine.idle.chunks_exact(engine.config.vae.latent) {
             let noise = &self.noise;
-            self.generator.append(absent, z, |token, eps| noise.fill(options.seed, temperature, token, eps));
+            self.generator.append(absent, z, |token, eps| noise.fill(options, temperature, token, eps));
             self.latent.copy_from_slice(z);
             engine.latent.restore(&mut self.latent);
             engine.decoder.step(&mut self.exec, &mut self.decoder, &self.latent, &mut self.features);
@@ -98,6 +107,11 @@ impl BlockState {
         }
         self.generator.warm_up(&mut self.exec, &engine.flow, engine.student.as_ref());
         self.exec.end();
+        if !engine.idle.is_empty() {
+            engine.pose.restore(&mut self.features);
+            let width = engine.features();
+            self.motion.prime(&self.features[(BLOCK_FRAMES - 1) * width..]);
+        }
         Ok(())
     }
 
@@ -123,15 +137,68 @@ impl BlockState {
         self.exec.end();
     }
 
-    /// Computes the next block into `frames`. Allocates nothing, takes no lock, makes no system call.
+    /// What the next block would cost on each of `ladder`, best first.
+    pub(super) fn outlook(&self, ladder: &[Sampler], branches: usize) -> Outlook {
+        let mut outlook = Outlook {
+            pass: self.work.pass(branches),
+            anchor: self.work.anchor(self.anchor.share(), branches),
+            ..Outlook::default()
+        };
+        for (i, sampler) in ladder.iter().enumerate() {
+            outlook.rungs[i] = self.work.block(&self.generator, *sampler, branches);
+            let behind = self.generator.visits(*sampler).map(|slot| self.generator.behind(slot));
+            outlook.behind[i] = behind.max().unwrap_or(0);
+        }
+        outlook
+    }
+
+    /// Computes the next block into `frames`, or holds the last pose. Allocates nothing, takes no lock, makes no system call
+    /// (`tests/sanitize.sh realtime` has the sanitizer watch this function).
+    #[cfg_attr(visavis_rtsan, sanitize(realtime = "nonblocking"))]
     pub(super) fn compute(
         &mut self,
         engine: &Engine,
         options: &SessionOptions,
+        plan: &Plan,
         mut probe: Option<&mut dyn Probe>,
     ) -> Result<()> {
+        if plan.hold == Hold::No {
+            self.generate(engine, options, plan, &mut probe)?;
+        } else {
+            self.hold(engine, plan)?;
+        }
+        for (i, frame) in self.frames.iter_mut().enumerate() {
+            frame.index = self.block * BLOCK_FRAMES as u64 + i as u64;
+            frame.time = frame.index as f64 / f64::from(FPS);
+            frame.sampler = plan.sampler;
+            let head = &frame.global[self.head];
+            frame.gaze = self.inputs.head_at(frame.index).and_then(|user| gaze_score(&engine.config.rig, head, user));
+        }
+        tell_frames(&mut probe, self.block, &self.frames);
+        self.block += 1;
+        Ok(())
+    }
+
+    fn hold(&mut self, engine: &Engine, plan: &Plan) -> Result<()> {
+        self.inputs.skip(self.block)?;
+        if plan.hold == Hold::Rehearse {
+            self.inputs.condition.clear();
+            let (student, condition) = (engine.student.as_ref(), &self.inputs.condition);
+            self.generator.rehearse(&mut self.exec, &engine.flow, student, plan.sampler, condition);
+        }
+        self.motion.hold_block(&mut self.frames);
+        Ok(())
+    }
+
+    fn generate(
+        &mut self,
+        engine: &Engine,
+        options: &SessionOptions,
+        plan: &Plan,
+        probe: &mut Option<&mut dyn Probe>,
+    ) -> Result<()> {
         let (block, root) = (self.block, self.motion.root());
-        self.inputs.prepare(&mut self.exec, engine, block, &root, options.gaze, &mut probe)?;
+        self.inputs.prepare(&mut self.exec, engine, block, &root, options.gaze, probe)?;
 
         let (student, noise, temperature) = (engine.student.as_ref(), &self.noise, options.temperature(engine));
         let mut tap = probe.as_mut().map(|p| |_: usize, x1: &[f32]| p.stage(block, "x1", x1));
@@ -139,17 +206,32 @@ impl BlockState {
             &mut self.exec,
             &engine.flow,
             student,
-            options.sampler,
+            plan.sampler,
             options.guidance(engine),
             &self.inputs.condition,
-            |token, eps| noise.fill(options.seed, temperature, token, eps),
+            |token, eps| noise.fill(options, temperature, token, eps),
             tap.as_mut().map(|tap| tap as _),
         );
         self.latent.copy_from_slice(z);
-        tell(&mut probe, block, "latents", &self.latent);
+        tell(probe, block, "latents", &self.latent);
 
+        let usable = !options.guard || self.latent.iter().all(|z| z.abs() < MAX_LATENT);
+        if !usable {
+            // Nothing of the kind may stay in the history or in a cache.
+            self.latent.fill(0.0);
+            let token = self.generator.history().len() - 1;
+            self.generator.history_mut().replace(token, &self.latent);
+            self.generator.forget();
+        }
         engine.latent.restore(&mut self.latent);
         engine.decoder.step(&mut self.exec, &mut self.decoder, &self.latent, &mut self.features);
+        if options.guard && !finite(&self.features) {
+            self.decoder.reset(block);
+        }
+        if !usable {
+            // The guard holds a pose for it.
+            self.features.fill(f32::NAN);
+        }
         self.anchor.step(
             &mut self.exec,
             engine,
@@ -158,33 +240,44 @@ impl BlockState {
             &self.latent,
             &mut self.features,
             &root,
+            plan.anchor,
         );
-        tell(&mut probe, block, "decoded", &self.features);
+        tell(probe, block, "decoded", &self.features);
+        if let Some((passes, sampler)) = plan.catch_up {
+            for _ in 0..passes {
+                self.generator.catch_up(&mut self.exec, &engine.flow, student, sampler);
+            }
+        }
 
         engine.pose.restore(&mut self.features);
+        let before = self.motion.guard_stats();
         self.motion.decode_block(&self.features, &mut self.frames)?;
-        for (i, frame) in self.frames.iter_mut().enumerate() {
-            frame.index = block * BLOCK_FRAMES as u64 + i as u64;
-            frame.time = frame.index as f64 / f64::from(FPS);
-            frame.sampler = options.sampler;
-            let head = &frame.global[self.head];
-            frame.gaze = self.inputs.head_at(frame.index).and_then(|user| gaze_score(&engine.config.rig, head, user));
+        if self.frames.iter().any(|frame| frame.held > 0.0) {
+            // The history must hold what was shown.
+            self.motion.shown(&mut self.features);
+            engine.pose.standardise_all(&mut self.features);
+            self.anchor.amend(&self.features);
         }
-        tell_frames(&mut probe, block, &self.frames);
-        self.block += 1;
+        if self.motion.guard_stats().trips > before.trips {
+            self.anchor.request();
+        }
         Ok(())
     }
 }
 
+fn finite(values: &[f32]) -> bool {
+    values.iter().all(|v| v.is_finite())
+}
+
 impl Noise {
     /// Seeded noise is scaled by `temperature`; given noise enters as it is.
-    fn fill(&self, seed: u64, temperature: f32, token: u64, eps: &mut [f32]) {
+    fn fill(&self, options: &SessionOptions, temperature: f32, token: u64, eps: &mut [f32]) {
         if let Noise::Given(values) = self
-            && let Some(given) = values.chunks_exact(eps.len()).nth(token as usize)
+            && let Some(given) = values.chunks_exact(eps.len()).nth((token - options.first_block) as usize)
         {
             return eps.copy_from_slice(given);
         }
-        normal(seed, token, eps);
+        normal(options.seed, token, eps);
         eps.iter_mut().for_each(|e| *e *= temperature);
     }
 }

@@ -22,6 +22,8 @@ struct Ear {
     features: Vec<f32>,
     /// Blocks by which it lags.
     delay: u64,
+    /// The session's first block.
+    first: u64,
     /// Whether the voice was present in the block before.
     open: bool,
 }
@@ -78,13 +80,25 @@ impl Ear {
             encoder: Hearing::new(engine, options.audio)?,
             features: vec![0.0; BLOCK_FRAMES * engine.config.audio.features],
             delay: u64::from(delay),
+            first: 0,
             open: false,
         })
     }
 
-    fn reset(&mut self) {
-        self.voice.reset();
+    fn reset(&mut self, first: u64) {
+        self.voice.reset_at(first);
+        (self.first, self.open) = (first, false);
+    }
+
+    /// The block whose sound `block` may know, unless that was before the session's start.
+    fn heard(&self, block: u64) -> Option<u64> {
+        block.checked_sub(self.delay).filter(|heard| *heard >= self.first)
+    }
+
+    /// Lets the sound that `block` may know go by unheard; the next that is heard starts a new signal.
+    fn skip(&mut self, block: u64, samples: &mut [f32; BLOCK_SAMPLES]) -> Result<()> {
         self.open = false;
+        self.heard(block).map_or(Ok(()), |heard| self.voice.take_block(heard, samples).map(drop))
     }
 
     /// Features of the sound that `block` may know, or `None` where there is none.
@@ -95,7 +109,7 @@ impl Ear {
         block: u64,
         samples: &mut [f32; BLOCK_SAMPLES],
     ) -> Result<Option<&[f32]>> {
-        let Some(heard) = block.checked_sub(self.delay) else { return Ok(None) };
+        let Some(heard) = self.heard(block) else { return Ok(None) };
         if !self.voice.take_block(heard, samples)? {
             self.open = false;
             return Ok(None);
@@ -121,11 +135,18 @@ impl Inputs {
         })
     }
 
-    pub(super) fn reset(&mut self) {
-        self.agent.reset();
-        self.user.reset();
+    /// Back to the start, which is that of block `first`.
+    pub(super) fn reset(&mut self, first: u64) {
+        self.agent.reset(first);
+        self.user.reset(first);
         self.track.reset();
         self.condition.clear();
+    }
+
+    /// Lets `block` go by: nobody listens.
+    pub(super) fn skip(&mut self, block: u64) -> Result<()> {
+        self.agent.skip(block, &mut self.samples)?;
+        self.user.skip(block, &mut self.samples)
     }
 
     pub(super) fn agent_voice(&mut self) -> &mut Voice {
@@ -178,7 +199,7 @@ impl Inputs {
     /// Floor positions `(x, z)` of the user over the four frames that `block` may know, in the agent's frame; `None` when
     /// the last of them is not known. Unknown earlier ones take the position that follows them.
     fn user_in_agent_frame(&mut self, block: u64, root: &Root) -> Option<[f32; 8]> {
-        let seen = block.checked_sub(self.user_delay)?;
+        let seen = block.checked_sub(self.user_delay).filter(|seen| *seen >= self.user.first)?;
         let now = (block * BLOCK_FRAMES as u64) as f64 / f64::from(FPS);
         let mut samples = [UserSample::default(); BLOCK_FRAMES];
         self.track.block(seen * BLOCK_FRAMES as u64, now, &mut samples);

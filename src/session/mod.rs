@@ -10,6 +10,7 @@
 //! | `inputs` | voices and head positions to the conditioning of a block |
 //! | `block` | the computation of a block |
 //! | `anchor` | re-anchoring: encoding recent motion anew, spread over blocks |
+//! | `governor/` | quality traded for time, block by block |
 //! | `stats` | block times and counters |
 //! | `probe` | every stage of a block, for whoever wants to check the maths |
 //!
@@ -18,11 +19,13 @@
 
 mod anchor;
 mod block;
+mod governor;
 mod inputs;
 mod options;
 mod probe;
 mod stats;
 
+pub use governor::{Budget, Decision, Governor, GovernorStats, Hold, Plan};
 pub use options::{Anchoring, HistoryTime, SessionOptions};
 pub use probe::Probe;
 pub use stats::{Delays, InputStats, SessionStats};
@@ -33,6 +36,7 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{BLOCK_FRAMES, FPS, Frame, Sampler};
 use block::BlockState;
 use glam::Vec3;
+use governor::{Log, Policy};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -46,13 +50,25 @@ pub struct Session {
     state: BlockState,
     now: f64,
     times: stats::BlockTimes,
+    policy: Option<Policy>,
+    log: Log,
+    /// The last block, until the next decision: its plan, its work, and the milliseconds that it took.
+    last: Option<(Plan, f64, f64)>,
 }
 
 impl Session {
     pub(crate) fn new(engine: Arc<Engine>, options: SessionOptions) -> Result<Self> {
         options.check(&engine)?;
         let state = BlockState::new(&engine, &options)?;
-        Ok(Self { engine, options, state, now: 0.0, times: stats::BlockTimes::new() })
+        let times = stats::BlockTimes::new();
+        let mut session = Self { engine, options, state, now: 0.0, times, policy: None, log: Log::new(), last: None };
+        session.policy = session.fresh_policy();
+        Ok(session)
+    }
+
+    fn fresh_policy(&self) -> Option<Policy> {
+        let Governor::Budget(budget) = &self.options.governor else { return None };
+        Some(Policy::new(budget, self.options.sampler, self.engine.student.is_some()))
     }
 
     /// Appends to the agent's own voice: mono samples, full scale 1, any rate from 8 to 192 kHz.
@@ -119,7 +135,8 @@ impl Session {
         Ok(())
     }
 
-    /// Sets the sampler from the next block on. Flow times that were not visited lately catch up in one batched pass.
+    /// Sets the sampler from the next block on; with a governor, the best one that it uses. Without one, flow times that were
+    /// not visited lately catch up in batched passes within that block.
     ///
     /// # Errors
     /// [`ErrorKind::Argument`] when this session has no slots, or the bundle no student, for it.
@@ -127,13 +144,82 @@ impl Session {
         if !self.state.supports(sampler) {
             return Err(options::unsupported(sampler, &self.engine));
         }
-        self.options.sampler = sampler;
+        if sampler != self.options.sampler {
+            self.options.sampler = sampler;
+            self.renew_policy();
+        }
         Ok(())
     }
 
-    /// The sampler that the next block will use.
+    /// The sampler that was set; what made a frame is in [`Frame::sampler`].
     pub fn sampler(&self) -> Sampler {
         self.options.sampler
+    }
+
+    /// Sets who chooses the samplers from the next block on. [`Governor::Off`] pins the session's sampler.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] for a budget out of range, or decisions that are not in ascending order.
+    pub fn set_governor(&mut self, governor: Governor) -> Result<()> {
+        governor.check()?;
+        self.options.governor = governor;
+        self.renew_policy();
+        Ok(())
+    }
+
+    fn renew_policy(&mut self) {
+        let stats = self.policy.as_ref().map(Policy::stats);
+        self.policy = self.fresh_policy().map(|policy| policy.with_stats(stats.unwrap_or_default()));
+        self.last = None;
+    }
+
+    /// Tells how long the last block took by the caller's own clock, milliseconds, in place of what the session measured; the
+    /// next decision of the governor goes by it. For callers whose deadline covers more than [`Session::poll`], and for
+    /// tests with a clock of their own. Without a block since the last decision it changes nothing.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] for a time that is not finite or negative.
+    pub fn report_block_time(&mut self, milliseconds: f64) -> Result<()> {
+        if !(milliseconds.is_finite() && milliseconds >= 0.0) {
+            return Err(Error::new(ErrorKind::Argument, format!("a block time of {milliseconds} ms: 0 or more")));
+        }
+        if let Some((_, _, measured)) = &mut self.last {
+            *measured = milliseconds;
+        }
+        Ok(())
+    }
+
+    /// The decisions of this session, oldest first: each plan that differs from that of the block before. The last 8192 are
+    /// kept. They can be replayed ([`Governor::Replay`]).
+    pub fn decisions(&self) -> impl Iterator<Item = Decision> + '_ {
+        self.log.iter()
+    }
+
+    /// The plan of the next block and its work.
+    fn plan(&mut self) -> (Plan, f64) {
+        let pinned = Plan::pinned(self.options.sampler);
+        let Some(policy) = &mut self.policy else {
+            let Governor::Replay(list) = &self.options.governor else { return (pinned, 0.0) };
+            let plan = governor::replayed(list, self.state.block).filter(|plan| self.state.supports(plan.sampler));
+            return (plan.unwrap_or(pinned), 0.0);
+        };
+        if let Some((plan, work, milliseconds)) = self.last.take() {
+            policy.observe(&plan, milliseconds, work);
+        }
+        let branches = if self.options.gaze.is_some() { 3 } else { 2 };
+        let outlook = self.state.outlook(policy.ladder(), branches);
+        let plan = policy.decide(&outlook);
+        let rung = policy.ladder().iter().position(|s| *s == plan.sampler).unwrap_or(0);
+        let work = match plan.hold {
+            Hold::Yes => 0.0,
+            Hold::Rehearse => self.state.work.rehearsal(plan.sampler, branches),
+            Hold::No => {
+                let passes = plan.catch_up.map_or(0.0, |(passes, _)| f64::from(passes));
+                let anchor = if plan.anchor { outlook.anchor } else { 0.0 };
+                outlook.rungs[rung][1] + passes * outlook.pass + anchor
+            }
+        };
+        (plan, work)
     }
 
     /// Computes the next block if it is due at `now` (session time, seconds) and returns its four frames, or `None`.
@@ -164,11 +250,15 @@ impl Session {
         if now < self.next_due() - 1e-9 {
             return Ok(None);
         }
+        let (plan, work) = self.plan();
+        self.log.record(self.state.block, plan);
         let started = Instant::now();
         self.state.begin();
-        let done = self.state.compute(&self.engine, &self.options, probe);
+        let done = self.state.compute(&self.engine, &self.options, &plan, probe);
         self.state.end();
-        self.times.record(started.elapsed());
+        let elapsed = started.elapsed();
+        self.times.record(elapsed);
+        self.last = Some((plan, work, 1000.0 * elapsed.as_secs_f64()));
         done?;
         Ok(Some(&self.state.frames))
     }
@@ -178,13 +268,17 @@ impl Session {
         (self.state.block * BLOCK_FRAMES as u64) as f64 / f64::from(FPS)
     }
 
-    /// Starts anew, as if just made with the current options: same seed, same bits. Time starts at 0 again.
+    /// Starts anew, as if just made with the current options: same seed, same bits. Time starts at 0 again (or at that of
+    /// [`SessionOptions::first_block`]).
     ///
     /// # Errors
     /// None that the session's creation would not have met.
     pub fn reset(&mut self) -> Result<()> {
         self.now = 0.0;
         self.times.clear();
+        self.log.clear();
+        self.policy = self.fresh_policy();
+        self.last = None;
         self.state.reset(&self.engine, &self.options)
     }
 
@@ -225,13 +319,24 @@ impl Session {
     /// Block times, delays and counters so far.
     pub fn stats(&self) -> SessionStats {
         SessionStats {
-            blocks: self.state.block,
+            blocks: self.state.block - self.options.first_block,
             block_ms: self.times.percentiles(),
             delays: self.state.inputs.delays(&self.engine.config),
             inputs: self.state.inputs.stats(),
             anchorings: self.state.anchor.count(),
+            governor: self.governor_stats(),
+            guard: self.state.motion.guard_stats(),
             cache_bytes: self.state.cache_bytes(),
         }
+    }
+
+    fn governor_stats(&self) -> GovernorStats {
+        let mut stats = self.policy.as_ref().map(Policy::stats).unwrap_or_default();
+        if let (Governor::Budget(budget), Some((_, _, milliseconds))) = (&self.options.governor, &self.last) {
+            stats.missed += u64::from(*milliseconds > f64::from(budget.milliseconds));
+        }
+        stats.forgotten_decisions = self.log.forgotten();
+        stats
     }
 
     /// The engine that this session runs on.

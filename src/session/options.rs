@@ -1,5 +1,6 @@
 //! What a session is made with.
 
+use super::Governor;
 use crate::audio::AudioBackend;
 use crate::config::CleanHistory;
 use crate::engine::Engine;
@@ -7,6 +8,9 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::flow::Guidance;
 use crate::frame::{Root, Sampler};
 use crate::kernels::KvDtype;
+
+/// Largest [`SessionOptions::first_block`].
+const MAX_FIRST_BLOCK: u64 = 70_000_000;
 
 /// When recent motion is encoded anew.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -42,8 +46,10 @@ pub struct SessionOptions {
     /// Cores that the second thread may run on (bit i: core i); `None` for any. The first thread is the caller's own:
     /// [`crate::par::pin_current_thread`].
     pub core_mask: Option<u64>,
-    /// Sampler at the start.
+    /// Sampler at the start; with a governor, the best one that it uses.
     pub sampler: Sampler,
+    /// Who chooses the sampler of each block.
+    pub governor: Governor,
     /// Gaze target, -1 to 1, or `None` for free gaze.
     pub gaze: Option<f32>,
     /// Guidance weight, 0 to 20; `None` for the bundle's.
@@ -64,6 +70,12 @@ pub struct SessionOptions {
     pub bridge: bool,
     /// Whether the root's steps are corrected so that planted feet stay where they are; off for checks of the maths.
     pub stance: bool,
+    /// Whether frames that no body could show are replaced by a held pose ([`crate::pose::GuardStats`]); without it a pose
+    /// that is not finite is an error. Off for checks of the maths.
+    pub guard: bool,
+    /// Number of the first block, at most 70 million (108 days): the session's time starts at `4 first_block / 30` s, and
+    /// everything that counts goes on from there. For checks of what long sessions do.
+    pub first_block: u64,
     /// What runs the audio encoder.
     pub audio: AudioBackend,
 }
@@ -75,6 +87,7 @@ impl Default for SessionOptions {
             threads: 1,
             core_mask: None,
             sampler: Sampler::Midpoint(4),
+            governor: Governor::Off,
             gaze: None,
             guidance: None,
             gaze_guidance: None,
@@ -85,6 +98,8 @@ impl Default for SessionOptions {
             anchoring: Anchoring::Bundle,
             bridge: true,
             stance: true,
+            guard: true,
+            first_block: 0,
             audio: AudioBackend::default(),
         }
     }
@@ -111,6 +126,10 @@ impl SessionOptions {
         if self.anchoring == Anchoring::Every(0) {
             return Err(argument("anchoring every 0 blocks: use Anchoring::Never"));
         }
+        if self.first_block > MAX_FIRST_BLOCK {
+            return Err(argument(format!("first block {}: at most {MAX_FIRST_BLOCK}", self.first_block)));
+        }
+        self.governor.check()?;
         match self.sampler {
             Sampler::Midpoint(1 | 2 | 4) | Sampler::Euler(1..=64) => Ok(()),
             Sampler::Single if engine.student.is_some() => Ok(()),

@@ -1,6 +1,8 @@
 //! What a session tells about itself.
 
+use super::GovernorStats;
 use crate::audio::VoiceStats;
+use crate::pose::GuardStats;
 use crate::user::TrackStats;
 use std::time::Duration;
 
@@ -21,6 +23,10 @@ pub struct SessionStats {
     pub inputs: InputStats,
     /// Times that recent motion was encoded anew.
     pub anchorings: u64,
+    /// What the governor did.
+    pub governor: GovernorStats,
+    /// What the plausibility guard met.
+    pub guard: GuardStats,
     /// Bytes of all key-value caches.
     pub cache_bytes: usize,
 }
@@ -39,7 +45,7 @@ pub struct Delays {
 }
 
 /// Counters of the inputs.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct InputStats {
     /// The agent's voice.
     pub agent_voice: VoiceStats,

@@ -11,6 +11,8 @@ use std::path::Path;
 
 /// Most blocks that are traced: ten minutes, whose stages already take hundreds of megabytes.
 const MAX_BLOCKS: usize = 4500;
+/// Longest file that is read, bytes.
+const MAX_BYTES: u64 = 1 << 30;
 
 /// Conditioning and noise of a run; see the table of [`crate::trace`].
 #[derive(Debug, Clone, PartialEq)]
@@ -37,7 +39,7 @@ impl TraceInput {
     /// safetensors, a tensor has another shape or type than the table says or is not finite, or no block would be run.
     pub fn read(path: impl AsRef<Path>, engine: &Engine) -> Result<Self> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|e| Error::io("read the trace's input", path, e))?;
+        let bytes = crate::bounded::read(path, MAX_BYTES).map_err(|e| Error::io("read the trace's input", path, e))?;
         Self::parse(&bytes, engine).map_err(|e| e.with_path(path))
     }
 

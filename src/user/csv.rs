@@ -5,6 +5,9 @@ use crate::error::{Error, ErrorKind, Result};
 use glam::Vec3;
 use std::path::Path;
 
+/// Longest file that is read, bytes: a day at 120 Hz is a third of it.
+const MAX_BYTES: u64 = 1 << 30;
+
 const COLUMNS: [&str; 4] = ["t", "x", "y", "z"];
 
 /// A recorded path of the user's head: positions at ascending times, at least one.
@@ -23,7 +26,7 @@ impl UserPath {
     /// a position beyond 1 km, or no positions at all.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|e| Error::io("read the user's path", path, e))?;
+        let bytes = crate::bounded::read(path, MAX_BYTES).map_err(|e| Error::io("read the user's path", path, e))?;
         let text = std::str::from_utf8(&bytes).map_err(|_| bad("not a text file in UTF-8; save it as CSV".into()));
         text.and_then(Self::parse).map_err(|e| e.with_path(path))
     }

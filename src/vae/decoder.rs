@@ -63,9 +63,9 @@ impl Decoder {
 }
 
 impl DecoderState {
-    /// Forgets the past.
-    pub fn reset(&mut self) {
-        self.0.reset();
+    /// Forgets the past; the next block gets the number `first`, from which positions count on.
+    pub fn reset(&mut self, first: u64) {
+        self.0.reset(first);
     }
 
     /// Takes back the last block, so that the next one takes its place (teacher-forced comparisons).

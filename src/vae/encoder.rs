@@ -67,9 +67,9 @@ impl Encoder {
 }
 
 impl EncoderState {
-    /// Forgets the past.
-    pub fn reset(&mut self) {
-        self.0.reset();
+    /// Forgets the past; the next block gets the number `first`, from which positions count on.
+    pub fn reset(&mut self, first: u64) {
+        self.0.reset(first);
     }
 
     /// Bytes of the ring cache.

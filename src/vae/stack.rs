@@ -31,6 +31,8 @@ struct Affine(Vec<f32>);
 pub(super) struct StackState {
     cache: KvCache,
     block: u64,
+    /// Block that the sequence started with.
+    first: u64,
     rows: Rows,
     phases: Phases,
     scratch: Scratch,
@@ -72,6 +74,7 @@ impl Stack {
         StackState {
             cache: KvCache::new(self.layers.len(), n * self.config.window_blocks, d, dtype),
             block: 0,
+            first: 0,
             rows: Rows::with_capacity(n),
             phases: self.rope.phases(n),
             scratch: Scratch::new(n, d, d * self.config.mlp),
@@ -83,7 +86,7 @@ impl Stack {
     /// Runs the block whose token embeddings are in `state.x`; returns the normed outputs, `tokens x width`.
     pub(super) fn step<'s>(&self, exec: &mut Exec, state: &'s mut StackState) -> &'s [f32] {
         let (n, d) = (self.tokens as u64, self.config.width);
-        let oldest = (state.block + 1).saturating_sub(self.config.window_blocks as u64);
+        let oldest = (state.block + 1).saturating_sub(self.config.window_blocks as u64).max(state.first);
         state.rows.clear();
         for row in 0..n {
             let position = state.block * n + row;
@@ -135,9 +138,9 @@ impl Affine {
 }
 
 impl StackState {
-    /// Forgets everything: the next block starts a new sequence.
-    pub(super) fn reset(&mut self) {
-        self.block = 0;
+    /// Forgets everything: the next block, number `first`, starts a new sequence.
+    pub(super) fn reset(&mut self, first: u64) {
+        (self.first, self.block) = (first, first);
     }
 
     /// Takes back the last block: the next one is written over it.

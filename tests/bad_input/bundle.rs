@@ -9,20 +9,20 @@ use visavis::engine::Engine;
 use visavis::error::{Error, ErrorKind};
 use visavis::session::SessionOptions;
 
-const NAME: &str = "some/bundle.safetensors";
+pub(super) const NAME: &str = "some/bundle.safetensors";
 
-fn tiny_bytes() -> Vec<u8> {
+pub(super) fn tiny_bytes() -> Vec<u8> {
     std::fs::read(golden_path("tiny.safetensors")).expect("the tiny bundle")
 }
 
 /// A bundle taken apart, to be changed and put together again.
-struct Parts {
-    config: serde_json::Value,
-    tensors: BTreeMap<String, (Dtype, Vec<usize>, Vec<u8>)>,
+pub(super) struct Parts {
+    pub(super) config: serde_json::Value,
+    pub(super) tensors: BTreeMap<String, (Dtype, Vec<usize>, Vec<u8>)>,
 }
 
 impl Parts {
-    fn tiny() -> Self {
+    pub(super) fn tiny() -> Self {
         let bytes = tiny_bytes();
         let (_, header) = SafeTensors::read_metadata(&bytes).unwrap();
         let config = serde_json::from_str(&header.metadata().as_ref().unwrap()[CONFIG_KEY]).unwrap();
@@ -31,7 +31,7 @@ impl Parts {
         Self { config, tensors: tensors.collect() }
     }
 
-    fn bytes(&self) -> Vec<u8> {
+    pub(super) fn bytes(&self) -> Vec<u8> {
         self.bytes_with(Some(self.config.to_string()))
     }
 
@@ -43,7 +43,7 @@ impl Parts {
         safetensors::serialize(views, metadata).unwrap()
     }
 
-    fn f32(&mut self, name: &str, shape: &[usize], value: f32) {
+    pub(super) fn f32(&mut self, name: &str, shape: &[usize], value: f32) {
         let data = value.to_le_bytes().repeat(shape.iter().product());
         self.tensors.insert(name.to_owned(), (Dtype::F32, shape.to_vec(), data));
     }

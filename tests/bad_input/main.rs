@@ -10,4 +10,5 @@ mod bundle;
 #[cfg(feature = "cli")]
 mod command;
 mod conversation;
+mod lies;
 mod trace;

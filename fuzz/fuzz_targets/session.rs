@@ -1,0 +1,159 @@
+//! A caller that does anything in any order: sizes, rates, NaN, time that goes back, options that change. Frames are finite and
+//! in order, errors are typed, nothing else happens.
+#![no_main]
+
+use arbitrary::{Arbitrary, Unstructured};
+use glam::Vec3;
+use libfuzzer_sys::fuzz_target;
+use visavis::error::ErrorKind;
+use visavis::frame::{Root, Sampler};
+use visavis::session::{Anchoring, Budget, Governor, Session, SessionOptions};
+use visavis_fuzz::engine;
+
+#[derive(Debug, Arbitrary)]
+struct Options {
+    seed: u64,
+    sampler: u8,
+    gaze: Option<f32>,
+    weights: Option<f32>,
+    temperature: Option<f32>,
+    start: [f64; 3],
+    anchoring: u8,
+    budget: Option<f32>,
+    stance: bool,
+    first_block: u32,
+}
+
+#[derive(Debug, Arbitrary)]
+enum Step {
+    /// Voice, length, rate, value.
+    Sound(bool, u16, u32, f32),
+    /// The same at a rate that is allowed.
+    GoodSound(bool, u16, u8),
+    Head([f32; 3], f64),
+    GoodHead([i8; 3], u8),
+    Poll(f64),
+    Due,
+    Gaze(Option<f32>),
+    Guidance(f32, f32),
+    Sampler(u8),
+    Governor(Option<f32>),
+    Time(f64),
+    Present(bool, bool),
+    Finish(bool),
+    Replay,
+    Reset,
+}
+
+fn sampler(i: u8) -> Sampler {
+    match i % 6 {
+        0 => Sampler::Midpoint(4),
+        1 => Sampler::Midpoint(i / 6),
+        2 => Sampler::Euler(i / 6),
+        3 => Sampler::Midpoint(2),
+        _ => Sampler::Single,
+    }
+}
+
+fn governor(budget: Option<f32>) -> Governor {
+    budget.map_or(Governor::Off, |milliseconds| Governor::Budget(Budget { milliseconds, coarse: milliseconds > 50.0 }))
+}
+
+fuzz_target!(|data: &[u8]| {
+    let mut u = Unstructured::new(data);
+    let Ok(o) = Options::arbitrary(&mut u) else { return };
+    let options = SessionOptions {
+        seed: o.seed,
+        sampler: sampler(o.sampler),
+        gaze: o.gaze,
+        guidance: o.weights,
+        temperature: o.temperature,
+        start: Root { x: o.start[0], z: o.start[1], yaw: o.start[2] },
+        anchoring: if o.anchoring == 0 { Anchoring::Bundle } else { Anchoring::Every(u32::from(o.anchoring) - 1) },
+        governor: governor(o.budget),
+        stance: o.stance,
+        first_block: u64::from(o.first_block),
+        ..SessionOptions::default()
+    };
+    let mut session = match engine().session(options) {
+        Ok(session) => session,
+        Err(e) => return assert_eq!(e.kind(), ErrorKind::Argument, "{e}"),
+    };
+    let mut next = None;
+    // Few blocks an execution: many executions.
+    let mut blocks = 0;
+    while let Ok(step) = Step::arbitrary(&mut u) {
+        if blocks >= 6 || u.is_empty() {
+            break;
+        }
+        blocks += take(&mut session, step, &mut next);
+    }
+});
+
+/// Takes a step; returns the number of blocks that were computed.
+fn take(session: &mut Session, step: Step, next: &mut Option<u64>) -> u32 {
+    let mut sound = [0.0f32; 4096];
+    let typed = |result: visavis::error::Result<()>| {
+        if let Err(e) = result {
+            assert!(matches!(e.kind(), ErrorKind::Argument | ErrorKind::Audio), "{e}");
+        }
+    };
+    let push = |session: &mut Session, agent, samples: &[f32], rate| {
+        if agent { session.push_agent_audio(samples, rate) } else { session.push_user_audio(samples, rate) }
+    };
+    match step {
+        Step::Sound(agent, len, rate, value) => {
+            sound.fill(value);
+            typed(push(session, agent, &sound[..usize::from(len) % sound.len()], rate));
+        }
+        Step::GoodSound(agent, len, i) => {
+            let rate = [8_000, 16_000, 24_000, 48_000, 192_000][usize::from(i) % 5];
+            sound.iter_mut().enumerate().for_each(|(i, s)| *s = (i as f32 * 0.1).sin());
+            push(session, agent, &sound[..usize::from(len) % sound.len()], rate).expect("a good sound");
+        }
+        Step::Head(p, time) => typed(session.push_user_head(Vec3::from(p), time)),
+        Step::GoodHead(p, later) => {
+            let time = session.next_due() + f64::from(later) / 100.0;
+            typed(session.push_user_head(Vec3::from(p.map(f32::from)) / 20.0, time));
+        }
+        Step::Poll(now) => return poll(session, now, next),
+        Step::Due => return poll(session, session.next_due(), next),
+        Step::Gaze(target) => typed(session.set_gaze(target)),
+        Step::Guidance(weight, gaze) => typed(session.set_guidance(weight, gaze)),
+        Step::Sampler(i) => typed(session.set_sampler(sampler(i))),
+        Step::Governor(budget) => typed(session.set_governor(governor(budget))),
+        Step::Time(ms) => typed(session.report_block_time(ms)),
+        Step::Present(agent, present) => {
+            if agent { session.agent_voice() } else { session.user_voice() }.set_present(present);
+        }
+        Step::Finish(agent) => if agent { session.agent_voice() } else { session.user_voice() }.finish(),
+        Step::Replay => {
+            let decisions: Vec<_> = session.decisions().collect();
+            typed(session.set_governor(Governor::Replay(decisions.into())));
+        }
+        Step::Reset => {
+            session.reset().expect("a reset");
+            *next = None;
+        }
+    }
+    0
+}
+
+fn poll(session: &mut Session, now: f64, next: &mut Option<u64>) -> u32 {
+    match session.poll(now) {
+        Ok(None) => 0,
+        Ok(Some(frames)) => {
+            for frame in frames {
+                assert!(next.is_none_or(|n| n == frame.index));
+                *next = Some(frame.index + 1);
+                assert!(frame.global.iter().all(|t| t.position.is_finite() && t.rotation.is_finite()));
+                assert!(frame.local.iter().all(|q| q.is_finite()) && frame.hips.is_finite());
+            }
+            1
+        }
+        Err(e) => {
+            assert!(matches!(e.kind(), ErrorKind::Argument | ErrorKind::State), "{e}");
+            0
+        }
+    }
+}

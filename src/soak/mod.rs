@@ -1,0 +1,132 @@
+//! Soak: hours of varied conversation as fast as they compute, judged.
+//!
+//! One session is driven through cycles of ten minutes in which everything changes: who speaks, sample rates, silence, a missing
+//! voice, a lost tracker, gaze targets, a user who walks, stands and teleports, samplers. A second session on the same engine
+//! runs beside it and is reset again and again. Judged are
+//!
+//! | verdict | holds when |
+//! |---|---|
+//! | memory | resident memory does not grow by more than 1 % over what it was in the second and third tenth of the run |
+//! | allocations | computing a block allocates nothing after the first cycle's tenth (where the caller can count) |
+//! | each metric (soaks of half an hour and more) | over the last ten minutes within 15 % of the first ten; the supporting foot's speed within 15 % of 2 cm/s where it is lower |
+//! | precision | the same noise and inputs a day later move no joint by more than 5 mm from what they do at hour 0 within 20 blocks |
+//! | guard | it trips no more than once a minute ([`crate::pose::DEFECTIVE_TRIPS_A_MINUTE`]) |
+//!
+//! | file | what |
+//! |---|---|
+//! | `script` | what happens when in a cycle |
+//! | `window` | metrics over minutes of frames, in constant memory |
+//! | `judge` | verdicts |
+
+mod judge;
+mod script;
+mod window;
+
+pub use judge::{Report, Verdict};
+pub use script::Voices;
+pub use window::Figures;
+
+use crate::engine::Engine;
+use crate::error::{Error, ErrorKind, Result};
+use crate::frame::{BLOCK_FRAMES, FPS, Sampler};
+use crate::session::{Session, SessionOptions};
+use script::Script;
+use std::sync::Arc;
+use std::time::Instant;
+use window::Window;
+
+/// Blocks of an hour of motion.
+const HOUR: f64 = 3600.0 * FPS as f64 / BLOCK_FRAMES as f64;
+/// Seconds of a cycle, and of the windows that are compared.
+const CYCLE: f64 = 600.0;
+
+/// What is soaked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Soak {
+    /// Hours of motion, above 0.
+    pub hours: f64,
+    /// Hour of the session's time at which it starts, as if it had run that long.
+    pub from_hour: f64,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// The best sampler; the student is used for a part of each cycle if there is one.
+    pub sampler: Sampler,
+}
+
+/// Counts allocations of the process so far, if the program can.
+pub type Allocations = fn() -> u64;
+
+impl Soak {
+    /// Runs it; `voices` are what the two say, over and over, and `progress` is told the hours done now and then.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] for hours out of range; those of a session.
+    pub fn run(
+        &self,
+        engine: &Arc<Engine>,
+        voices: &Voices,
+        allocations: Option<Allocations>,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Report> {
+        if !(self.hours > 0.0 && self.hours <= 1000.0 && (0.0..=2000.0).contains(&self.from_hour)) {
+            return Err(Error::new(ErrorKind::Argument, "hours above 0 up to 1000, from an hour of 0 to 2000"));
+        }
+        let blocks = ((self.hours * HOUR) as u64).max(30);
+        // Short soaks have short cycles: three of them at least.
+        let cycle = ((CYCLE * HOUR / 3600.0) as u64).min(blocks / 3).max(10);
+        let options = SessionOptions {
+            seed: self.seed,
+            sampler: self.sampler,
+            first_block: (self.from_hour * HOUR) as u64,
+            ..SessionOptions::default()
+        };
+        let mut session = engine.session(options.clone())?;
+        let mut second = engine.session(SessionOptions { seed: self.seed + 1, first_block: 0, ..options })?;
+        let mut script = Script::new(voices, engine, self.sampler, cycle);
+        let mut windows = [Window::new(&engine.config().rig), Window::new(&engine.config().rig)];
+        let warm = (cycle / 10).max(10);
+        let (mut allocated, mut memory) = (0, judge::Memory::default());
+        let started = Instant::now();
+        for block in 0..blocks {
+            script.block(&mut session, block)?;
+            let before = allocations.map(|count| count());
+            let due = session.next_due();
+            let frames = session.poll(due)?.unwrap_or_default();
+            if let (Some(count), true) = (allocations, block >= warm) {
+                allocated += count() - before.unwrap_or_default();
+            }
+            if let Some(last) = frames.last() {
+                script.see(last.root);
+            }
+            let user = script.user();
+            for (window, wanted) in windows.iter_mut().zip([block < cycle, block >= blocks - cycle]) {
+                if wanted {
+                    window.take(frames, user);
+                }
+            }
+            if block % 8 == 0 {
+                besides(&mut second, block)?;
+            }
+            if block % 64 == 0 {
+                memory.sample(block as f64 / blocks as f64);
+                progress(block as f64 / HOUR);
+            }
+        }
+        memory.sample(1.0);
+        let seconds = started.elapsed().as_secs_f64();
+        let stats = session.stats();
+        let precision = judge::precision(engine, voices, self.sampler)?;
+        let figures = windows.map(|window| window.finish());
+        Ok(judge::report(self, blocks, seconds, &stats, figures, memory, allocations.map(|_| allocated), precision))
+    }
+}
+
+/// The second session: a block now and then, a fresh start every few minutes.
+fn besides(session: &mut Session, block: u64) -> Result<()> {
+    let due = session.next_due();
+    session.poll(due)?;
+    if block % 1200 == 1192 { session.reset() } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,58 @@
+use super::*;
+use crate::frame::Sampler;
+
+fn tiny() -> Arc<Engine> {
+    Engine::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/goldens/tiny.safetensors")).unwrap()
+}
+
+fn voices() -> Voices {
+    let voice = |hz: f32| (0..48_000).map(|i| 0.3 * (i as f32 * hz).sin() * (i as f32 * 3e-4).sin()).collect();
+    Voices::new(voice(0.05), voice(0.08)).unwrap()
+}
+
+/// Nine minutes of the tiny model: everything is driven and everything is measured. Its weights are random, so its motion and
+/// what the guard makes of it say nothing; that drift is judged as it should be is tested apart.
+#[test]
+fn a_short_soak_measures_everything() {
+    let soak = Soak { hours: 0.15, from_hour: 24.0, seed: 3, sampler: Sampler::Midpoint(2) };
+    let mut told = Vec::new();
+    let report = soak.run(&tiny(), &voices(), None, &mut |hours| told.push(hours)).unwrap();
+    assert_eq!((report.blocks, report.windows.len()), (4050, 2));
+    assert!(told.len() > 60 && told.windows(2).all(|w| w[0] < w[1]));
+    assert!(report.windows.iter().all(|w| w.all().iter().all(|(_, v)| v.is_some_and(f64::is_finite))), "{report:?}");
+    assert!(report.day_difference < 0.005, "{}", report.day_difference);
+    let names: Vec<_> = report.verdicts.iter().map(|v| v.name.as_str()).collect();
+    assert!(names.ends_with(&["precision", "guard"]), "{names:?}");
+    assert!(serde_json::to_string(&report).unwrap().contains("\"verdicts\""));
+}
+
+#[test]
+fn hours_out_of_range_are_refused() {
+    for (hours, from_hour) in [(0.0, 0.0), (f64::NAN, 0.0), (1e9, 0.0), (1.0, -1.0), (1.0, f64::INFINITY)] {
+        let soak = Soak { hours, from_hour, seed: 0, sampler: Sampler::Single };
+        let e = soak.run(&tiny(), &voices(), None, &mut |_| {}).unwrap_err();
+        assert_eq!(e.kind(), ErrorKind::Argument);
+    }
+    assert!(Voices::new(Vec::new(), vec![0.0]).is_err() && Voices::new(vec![f32::NAN], vec![0.0]).is_err());
+}
+
+#[test]
+fn drift_growth_and_allocations_fail() {
+    let soak = Soak { hours: 1.0, from_hour: 0.0, seed: 0, sampler: Sampler::Single };
+    let stats = tiny().session(SessionOptions::default()).unwrap().stats();
+    let figures = |wrist: f64, support: f64| Figures {
+        wrist_speed: Some(wrist),
+        support_foot_speed: Some(support),
+        ..Figures::default()
+    };
+    let passed = |last: Figures, allocations: u64, day: f64| {
+        let windows = [figures(0.5, 0.001), last];
+        let report = judge::report(&soak, 1, 1.0, &stats, windows, judge::Memory::default(), Some(allocations), day);
+        report.passed()
+    };
+    assert!(passed(figures(0.56, 0.003), 0, 0.0), "12 %, and 10 % of 2 cm/s");
+    assert!(!passed(figures(0.58, 0.001), 0, 0.0), "16 %");
+    assert!(!passed(figures(0.5, 0.0045), 0, 0.0), "17 % of 2 cm/s");
+    assert!(!passed(figures(0.5, 0.001), 1, 0.0), "an allocation");
+    assert!(!passed(figures(0.5, 0.001), 0, 0.01), "a centimetre after a day");
+}
