@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod audio;
+pub mod bench;
 pub mod bundle;
 pub mod config;
 pub mod engine;

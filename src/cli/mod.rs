@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 1 an error (one line on stderr, `visavis: ...`), 2 wrong usage.
 
 mod args;
+mod bench;
 mod demo;
 mod eval;
 mod files;
@@ -28,6 +29,7 @@ pub fn main() -> ExitCode {
             Command::Inspect(args) => inspect::run(&args),
             Command::Quantize(args) => quantize::run(&args),
             Command::Report(args) => report::run(&args),
+            Command::Bench(args) => bench::run(&args),
             Command::Eval(args) => eval::run(&args),
             Command::Trace(args) => trace::run(&args),
         },
