@@ -21,9 +21,9 @@ fn a_bench_is_whole() {
 }
 
 #[test]
-fn seeded_sizes_run_in_every_scheme() {
+fn seeded_sizes_run_quantised() {
     let kernels = Kernels::detect().unwrap();
-    let bytes: Vec<_> = [Scheme::F32, Scheme::F16, Scheme::I8, Scheme::I4]
+    let bytes: Vec<_> = [Scheme::F16, Scheme::I8]
         .map(|scheme| {
             let engine = Size::Base.engine(scheme, kernels).unwrap();
             let mut session = engine.session(SessionOptions::default()).unwrap();
@@ -32,7 +32,7 @@ fn seeded_sizes_run_in_every_scheme() {
             engine.weight_bytes()
         })
         .to_vec();
-    assert!(bytes.windows(2).all(|w| w[1] < w[0]), "each scheme is smaller than the one before: {bytes:?}");
+    assert!(bytes.windows(2).all(|w| w[1] < w[0]), "int8 is smaller: {bytes:?}");
 }
 
 #[test]
