@@ -101,6 +101,11 @@ impl Engine {
         Ok(Arc::new(engine))
     }
 
+    /// An engine of given tensors; [`Engine::from_file`] is the way for bundles.
+    pub(crate) fn from_tensors(config: Config, t: &Tensors<'_>, kernels: Kernels) -> Result<Arc<Self>> {
+        Self::build(config, t, kernels).map(Arc::new)
+    }
+
     fn build(config: Config, t: &Tensors<'_>, kernels: Kernels) -> Result<Self> {
         let features = feature_count(config.rig.joints.len());
         let latent = config.vae.latent;

@@ -2,6 +2,7 @@
 #![cfg_attr(visavis_rtsan, feature(sanitize))]
 
 pub mod audio;
+pub mod bench;
 mod bounded;
 pub mod bundle;
 pub mod config;

@@ -15,19 +15,27 @@ use std::collections::HashSet;
 /// [`Tensors::finish`] can name what nobody asked for.
 #[derive(Debug)]
 pub struct Tensors<'a> {
-    container: SafeTensors<'a>,
+    container: Option<SafeTensors<'a>>,
+    /// Without a container: weights of this scheme are drawn as they are asked for.
+    drawn: Option<Scheme>,
     quantisation: Option<Quantisation>,
     read: RefCell<HashSet<String>>,
 }
 
 impl<'a> Tensors<'a> {
     pub(super) fn new(container: SafeTensors<'a>, quantisation: Option<Quantisation>) -> Self {
-        Self { container, quantisation, read: RefCell::default() }
+        Self { container: Some(container), drawn: None, quantisation, read: RefCell::default() }
+    }
+
+    /// No bundle: every tensor that is asked for is there, drawn from its name, weights of some size in `scheme`. To measure
+    /// networks of sizes for which there is no bundle.
+    pub(crate) fn seeded(scheme: Scheme) -> Self {
+        Self { container: None, drawn: Some(scheme), quantisation: None, read: RefCell::default() }
     }
 
     /// Names, dtypes, shapes and sizes, sorted by name; the dtype of quantised weights is their scheme.
     pub fn infos(&self) -> Vec<super::TensorInfo> {
-        let mut infos: Vec<_> = (self.container.iter())
+        let mut infos: Vec<_> = (self.container.iter().flat_map(SafeTensors::iter))
             .map(|(name, view)| super::TensorInfo {
                 name: name.to_owned(),
                 dtype: match self.recorded(name) {
@@ -48,6 +56,9 @@ impl<'a> Tensors<'a> {
     /// [`ErrorKind::BundleInvalid`] when it is missing or of another dtype or shape, [`ErrorKind::BundleCorrupt`] when
     /// a number is not finite.
     pub fn f32(&self, name: &str, shape: &[usize]) -> Result<Vec<f32>> {
+        if self.drawn.is_some() {
+            return Ok(drawn(name, shape));
+        }
         let view = self.view(name, Some(shape))?;
         floats(name, &view)
     }
@@ -57,6 +68,9 @@ impl<'a> Tensors<'a> {
     /// # Errors
     /// As [`Tensors::f32`].
     pub fn f32_rows(&self, name: &str, columns: usize) -> Result<(usize, Vec<f32>)> {
+        if self.drawn.is_some() {
+            return Ok((DRAWN_ROWS, drawn(name, &[DRAWN_ROWS, columns])));
+        }
         let view = self.view(name, None)?;
         match view.shape() {
             &[rows, c] if c == columns && rows > 0 => Ok((rows, floats(name, &view)?)),
@@ -80,6 +94,14 @@ impl<'a> Tensors<'a> {
         let (weight, scale) = (format!("{name}.weight"), format!("{name}.scale"));
         let cols = inputs.iter().product::<usize>();
         let shape = [&[outputs], inputs].concat();
+        if let Some(scheme) = self.drawn {
+            let values = drawn(&weight, &[outputs, cols]);
+            return match scheme {
+                Scheme::F32 => Ok(StoredWeights { rows: outputs, cols, data: StoredData::F32(values) }),
+                _ if outputs * cols < crate::quant::SMALL => crate::quant::round(&values, outputs, cols, Scheme::F16),
+                _ => crate::quant::round(&values, outputs, cols, scheme),
+            };
+        }
         let data = match self.recorded(&weight) {
             None => self.plain(&weight, &shape)?,
             Some(scheme @ (Scheme::F32 | Scheme::F16)) => {
@@ -124,7 +146,7 @@ impl<'a> Tensors<'a> {
         let read = self.read.borrow();
         let recorded = self.quantisation.iter().flat_map(|q| q.tensors.keys().map(String::as_str));
         let mut unread: Vec<_> =
-            self.container.names().into_iter().chain(recorded).filter(|n| !read.contains(*n)).collect();
+            self.container.iter().flat_map(SafeTensors::names).chain(recorded).filter(|n| !read.contains(*n)).collect();
         unread.sort_unstable();
         unread.dedup();
         match unread.first() {
@@ -153,8 +175,9 @@ impl<'a> Tensors<'a> {
     }
 
     fn view(&self, name: &str, shape: Option<&[usize]>) -> Result<TensorView<'a>> {
-        let view = (self.container.tensor(name))
-            .map_err(|_| invalid(format!("tensor {name} is missing; export the bundle again")))?;
+        let view = (self.container.as_ref())
+            .and_then(|container| container.tensor(name).ok())
+            .ok_or_else(|| invalid(format!("tensor {name} is missing; export the bundle again")))?;
         if let Some(shape) = shape
             && view.shape() != shape
         {
@@ -164,6 +187,29 @@ impl<'a> Tensors<'a> {
         self.read.borrow_mut().insert(name.to_owned());
         Ok(view)
     }
+}
+
+/// Rows of a drawn matrix that may have any number.
+const DRAWN_ROWS: usize = 8;
+
+/// Numbers that depend on the name alone: standard deviations are 1, others spread evenly around 0 within one over the root of the row's
+/// length.
+fn drawn(name: &str, shape: &[usize]) -> Vec<f32> {
+    let count = shape.iter().product();
+    if name.ends_with("_std") {
+        return vec![1.0; count];
+    }
+    let scale = 1.0 / (shape.last().copied().unwrap_or(1).max(1) as f32).sqrt();
+    // FNV-1a of the name, then a xorshift.
+    let mut state =
+        name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)) | 1;
+    let mut next = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 40) as f32 / (1 << 23) as f32 - 1.0
+    };
+    (0..count).map(|_| scale * next()).collect()
 }
 
 fn disagree(name: &str, scheme: Scheme, dtype: Dtype) -> Error {

@@ -31,6 +31,8 @@ pub enum Command {
     Quantize(QuantizeArgs),
     /// Reports what quantised bundles lose and what they cost
     Report(ReportArgs),
+    /// Measures how fast a bundle, or a network of a size, runs here, and where the time goes
+    Bench(super::bench::BenchArgs),
     /// Judges a bundle on recorded conversations: motion, gaze, reaction, endurance, against targets
     Eval(super::eval::EvalArgs),
     /// Drives a session through hours of motion and judges memory, allocations, drift and precision

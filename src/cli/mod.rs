@@ -4,6 +4,7 @@
 
 mod allocations;
 mod args;
+mod bench;
 mod demo;
 mod eval;
 mod files;
@@ -30,6 +31,7 @@ pub fn main() -> ExitCode {
             Command::Inspect(args) => inspect::run(&args),
             Command::Quantize(args) => quantize::run(&args),
             Command::Report(args) => report::run(&args),
+            Command::Bench(args) => bench::run(&args),
             Command::Eval(args) => eval::run(&args),
             Command::Soak(args) => soak::run(&args),
             Command::Trace(args) => trace::run(&args),

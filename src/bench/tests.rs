@@ -1,0 +1,42 @@
+//! What is measured is there and adds up; how fast it is, is nobody's promise.
+
+use super::*;
+use crate::kernels::{Kernels, Scheme};
+
+#[test]
+fn a_bench_is_whole() {
+    let engine = Engine::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/goldens/tiny.safetensors")).unwrap();
+    for (sampler, threads) in [(Sampler::Midpoint(4), 1), (Sampler::Single, 2)] {
+        let bench = Bench::run(&engine, BenchOptions { sampler, threads, blocks: 12 }).unwrap();
+        let [p50, p95, p99, max] = bench.block_ms;
+        assert!(0.0 < p50 && p50 <= p95 && p95 <= p99 && p99 <= max, "{bench:?}");
+        assert!(bench.stages.all().iter().all(|t| *t > 0.0), "every stage was seen: {bench:?}");
+        assert!(bench.read_limit_gb_s > 0.0 && bench.weights_gb_s > 0.0);
+        assert_eq!(bench.weight_bytes_a_block, engine.block_bytes(sampler));
+        assert!((bench.frames_per_second * p50 - 4000.0).abs() < 1e-6);
+        assert!(bench.first_frame_ms > 0.0 && bench.cache_bytes > 0);
+    }
+    let none = BenchOptions { sampler: Sampler::Single, threads: 1, blocks: 0 };
+    assert_eq!(Bench::run(&engine, none).unwrap_err().kind(), ErrorKind::Argument);
+}
+
+#[test]
+fn seeded_sizes_run_quantised() {
+    let kernels = Kernels::detect().unwrap();
+    let bytes: Vec<_> = [Scheme::F16, Scheme::I8]
+        .map(|scheme| {
+            let engine = Size::Base.engine(scheme, kernels).unwrap();
+            let mut session = engine.session(SessionOptions::default()).unwrap();
+            let frames = session.poll(0.0).unwrap().unwrap();
+            assert!(frames.iter().all(|f| f.global.iter().all(|t| t.position.is_finite())), "{scheme}");
+            engine.weight_bytes()
+        })
+        .to_vec();
+    assert!(bytes.windows(2).all(|w| w[1] < w[0]), "int8 is smaller: {bytes:?}");
+}
+
+#[test]
+fn sizes_have_names() {
+    assert_eq!("paper".parse::<Size>().unwrap(), Size::Paper);
+    assert!("huge".parse::<Size>().unwrap_err().to_string().contains("paper or base"));
+}
