@@ -41,8 +41,9 @@ for target in "${targets[@]}"; do
   [ "$target" = bundle_bytes ] || for_long+=(-max_len=4096)
   echo "== $target"
   # New inputs go to the folder of work, seeds stay as they are.
-  "$program" "${limits[@]}" "${for_long[@]}" -artifact_prefix="artifacts/$target/" "$out/work/$target" "corpus/$target" 2>&1 |
-    grep -E '^(stat::number_of_executed_units|stat::peak_rss_mb|==[0-9]+==|SUMMARY|.*panicked)' || true
-  status=${PIPESTATUS[0]}
+  status=0
+  "$program" "${limits[@]}" "${for_long[@]}" -artifact_prefix="artifacts/$target/" "$out/work/$target" "corpus/$target" \
+    >"$out/work/$target.log" 2>&1 || status=$?
+  grep -E '^(stat::number_of_executed_units|stat::peak_rss_mb|==[0-9]+==|SUMMARY|.*panicked)' "$out/work/$target.log" || true
   [ "$status" = 0 ] || { echo "fuzz/$target: exit code $status; see fuzz/artifacts/$target" >&2; exit 1; }
 done

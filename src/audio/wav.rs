@@ -49,6 +49,7 @@ impl Wav {
         let data_len = (chunks.data_len as u32).to_le_bytes();
         // Only `fmt ` and `data`, so that nothing in between can mislead the decoder.
         let head = [&b"RIFF\0\0\0\0WAVE"[..], chunks.format, b"data", &data_len].concat();
+        chunks.check_width()?;
         let reader = hound::WavReader::new(Cursor::new(head).chain(chunks.data)).map_err(|e| decode_error(&e))?;
         Self::decode(reader)
     }
@@ -123,6 +124,19 @@ struct Chunks<'a> {
 }
 
 impl<'a> Chunks<'a> {
+    /// Refuses an extensible format (`0xFFFE`) that claims more valid bits than its samples have, or none.
+    fn check_width(&self) -> Result<()> {
+        let field = |at: usize| self.format.get(8 + at..10 + at).map_or(0, |b| u16::from_le_bytes([b[0], b[1]]));
+        let (kind, container, valid) = (field(0), field(14), field(18));
+        if kind == 0xFFFE && self.format.len() >= 28 && (valid == 0 || valid > container.min(32)) {
+            return Err(bad(format!(
+                "its header says that {valid} bits of {container} are valid; convert it to 16-bit PCM, for example with \
+                 `sox in.wav -b 16 out.wav`"
+            )));
+        }
+        Ok(())
+    }
+
     fn find(bytes: &'a [u8]) -> Result<Self> {
         if bytes.is_empty() {
             return Err(bad("the file is empty; record or convert it again"));
@@ -238,6 +252,24 @@ mod tests {
         let mut compressed = file(1, 16_000, 16, SampleFormat::Int, &SAMPLES);
         compressed[20] = 0x55;
         refused(&compressed, "compressed");
+    }
+
+    #[test]
+    fn more_valid_bits_than_bits_are_refused() {
+        let format = |bits: u16, valid: u16| {
+            let mut bytes = b"RIFF\0\0\0\0WAVEfmt \x28\0\0\0\xfe\xff\x01\0\x80\xbb\0\0\0\x77\x01\0".to_vec();
+            bytes.extend((bits / 8).to_le_bytes());
+            bytes.extend(bits.to_le_bytes());
+            bytes.extend(22u16.to_le_bytes());
+            bytes.extend(valid.to_le_bytes());
+            bytes.extend([4, 0, 0, 0]);
+            bytes.extend(b"\x01\0\0\0\0\0\x10\0\x80\0\0\xaa\0\x38\x9b\x71data\x08\0\0\0\0\x40\0\xc0\0\x20\0\xe0");
+            bytes
+        };
+        assert_eq!(Wav::parse(&format(16, 16)).unwrap().samples, [0.5, -0.5, 0.25, -0.25]);
+        for (bits, valid) in [(16, 0), (16, 17), (16, 40), (16, 65_496), (32, 33), (24, 64)] {
+            refused(&format(bits, valid), "bits of");
+        }
     }
 
     #[test]
