@@ -3,7 +3,7 @@
 #
 # Builds the targets of this folder with the coverage counters that libFuzzer needs (flags that stable compilers accept
 # with RUSTC_BOOTSTRAP) and runs each for SECONDS, from the seeds of seeds.py. SANITIZER=address adds AddressSanitizer;
-# RUNS=N runs N executions a target instead of SECONDS. Exit code 0: no crash, no time-out, no memory beyond 3 GiB.
+# RUNS=N runs N executions a target, always the same ones, instead of SECONDS. Exit code 0: no crash, no time-out, no memory beyond 3 GiB.
 # What a target finds is left in fuzz/artifacts/TARGET/; replay it with fuzz/check.sh 0 TARGET FILE.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
@@ -37,7 +37,7 @@ for target in "${targets[@]}"; do
     continue
   fi
   for_long=(-max_total_time="$seconds")
-  [ -z "${RUNS:-}" ] || for_long=(-runs="$RUNS")
+  [ -z "${RUNS:-}" ] || for_long=(-runs="$RUNS" -seed=1)
   [ "$target" = bundle_bytes ] || for_long+=(-max_len=4096)
   echo "== $target"
   # New inputs go to the folder of work, seeds stay as they are.

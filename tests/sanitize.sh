@@ -4,14 +4,15 @@
 #   address   AddressSanitizer with leak detection: kernels, pool, sessions, readers
 #   thread    ThreadSanitizer: the fork-join pool and sessions with two threads; the standard library is not instrumented,
 #             tests/tsan.supp names what that hides
-#   realtime  RealtimeSanitizer: every block of the real-time tests, where any allocation, lock or blocking call is fatal
+#   realtime  RealtimeSanitizer: every block of the real-time tests, where any allocation, lock or blocking call is fatal but the
+#             yield that tests/rtsan.supp names
 #
 # No nightly toolchain: flags that stable compilers accept with RUSTC_BOOTSTRAP. `full` runs all tests of the library and of
 # tests/ but those that put processes under limits of their own. A toolchain without the sanitizer's runtime is skipped with a note.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 kind=${1:-}
-case $kind in address | thread | realtime) ;; *) sed -n '2,11s/^# \{0,1\}//p' "$0"; exit 2 ;; esac
+case $kind in address | thread | realtime) ;; *) sed -n '2,12s/^# \{0,1\}//p' "$0"; exit 2 ;; esac
 
 host=$(rustc -vV | sed -n 's/^host: //p')
 names=(address=asan thread=tsan realtime=rtsan)
@@ -24,6 +25,7 @@ fi
 
 export RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=$kind"
 export CARGO_PROFILE_TEST_DEBUG=line-tables-only
+export RTSAN_OPTIONS="suppressions=$PWD/tests/rtsan.supp"
 export ASAN_OPTIONS=detect_leaks=1:abort_on_error=0 TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp halt_on_error=1"
 cargo=(cargo test --quiet --target "$host" --target-dir "target/sanitize/$kind" --no-default-features --features cli)
 case $kind in
