@@ -130,6 +130,8 @@ fn seeds_and_gaze_targets_matter() {
     };
     assert!(differs(SessionOptions { seed: 1, ..options() }));
     assert!(differs(SessionOptions { gaze: Some(0.0), ..options() }));
+    assert!(differs(SessionOptions { stance: false, ..options() }));
+    assert!(differs(SessionOptions { bridge: false, ..options() }));
     assert!(differs(SessionOptions { gaze: None, ..options() }));
     assert!(differs(SessionOptions { sampler: Sampler::Midpoint(2), ..options() }));
     assert!(differs(SessionOptions { guidance: Some(3.0), ..options() }));

@@ -67,6 +67,9 @@ impl BlockState {
         if options.guard {
             motion = motion.with_guard();
         }
+        if options.stance {
+            motion = motion.with_stance(rig);
+        }
         let mut state = Self {
             inputs: Inputs::new(engine, options)?,
             generator,
