@@ -147,7 +147,7 @@ impl Slots {
         (end - self.slots[slot].committed.min(end)).min(self.window)
     }
 
-    /// Computes the keys and values of tokens `from..` (at most [`CHUNK`] of them, none before `oldest`) of slot `slot` anew,
+    /// Computes the keys and values of tokens `from..` (at most `CHUNK` of them, none before `oldest`) of slot `slot` anew,
     /// in place, seeing nothing before `oldest`; returns the token to go on with, or `None` when the slot is through.
     /// The rest of the slot stays as it is, so it can be used between two of these passes.
     pub fn rewrite(
