@@ -60,7 +60,7 @@ fn sessions_leave_nothing_behind() {
         .expect("no thread is left behind");
     println!("{cycles} sessions: {before:?} before, {after:?} after (bytes, threads, files)");
     assert_eq!(before[2], after[2], "files are left open");
-    // One leaked session is megabytes; allocators move by less.
+    // A leaked session is megabytes, hundreds of them are hundreds; what an allocator keeps for the threads of 300 sessions was seen to be 12.
     let grown = after[0].saturating_sub(before[0]);
-    assert!(grown < 4 << 20, "{grown} bytes more after {cycles} sessions");
+    assert!(grown < 32 << 20, "{grown} bytes more after {cycles} sessions");
 }
