@@ -67,9 +67,6 @@ if ! diff <(grep '^digest ' "$out/host.log") <(grep '^digest ' "$out/arm64.log")
   exit 1
 fi
 
-echo '-- microphone through oboe: types only'
-DOCS_RS=1 "$kit/build.sh" --check android/native --features oboe
-
 echo '-- AAR: twice the same bytes; parts, manifest, keep rules, natives declared and exported'
 for n in 1 2; do
   "$kit/mkaar.py" --package org.visavis --classes "$out/classes" --jni "$so" --proguard android/visavis/consumer-rules.pro \
