@@ -1,6 +1,8 @@
 """The decoder on roll-outs, processes that train together, bundles taken apart."""
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import torch
 
@@ -68,5 +70,6 @@ team.close()
 def test_two_processes_average_gradients_and_agree_on_progress(tmp_path):
     script = tmp_path / "team.py"
     script.write_text(TEAM)
-    subprocess.run([sys.executable, str(script), str(tmp_path / "out")], check=True, timeout=100)
+    here = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    subprocess.run([sys.executable, str(script), str(tmp_path / "out")], check=True, timeout=300, env=here)
     assert [(tmp_path / f"out{r}").read_text() for r in (0, 1)] == ["3.0 0.25", "3.0 0.25"]
