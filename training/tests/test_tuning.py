@@ -1,15 +1,17 @@
-"""The decoder on roll-outs, processes that train together, bundles taken apart."""
+"""The decoder on roll-outs, the loop that trainers share, processes that train together, bundles taken apart."""
+import json
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 import torch
+from safetensors.torch import load_file
 
-from visavis_train import bundle, checkpoints, make_tiny
+from visavis_train import bundle, checkpoints, export, make_tiny
 from visavis_train.motion import rig
-from visavis_train.nets.flow import FlowNet
-from visavis_train.train import decoder, vae
+from visavis_train.nets.flow import Condition, FlowNet
+from visavis_train.train import common, decoder, student, vae
 
 
 def still_body(frames=32):
@@ -73,3 +75,55 @@ def test_two_processes_average_gradients_and_agree_on_progress(tmp_path):
     here = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
     subprocess.run([sys.executable, str(script), str(tmp_path / "out")], check=True, timeout=300, env=here)
     assert [(tmp_path / f"out{r}").read_text() for r in (0, 1)] == ["3.0 0.25", "3.0 0.25"]
+
+
+class Alone:
+    """A team of one."""
+    leads = True
+
+    def average(self, net, progress):
+        return progress
+
+    def close(self):
+        pass
+
+
+def test_a_loop_learns_logs_and_goes_on_where_it_stood(tmp_path):
+    out, x = str(tmp_path / "net.pt"), torch.randn(64, 3)
+    wish = x @ torch.tensor([[1.0], [-2.0], [0.5]])
+    net = torch.nn.Linear(3, 1)
+    error = lambda n: (n(x) - wish).square().mean()
+    before = error(net).item()
+    loop = common.Loop(Alone(), net, out, 100.0, 0.05, warmup=5, average=0.9, size=3)
+    for _ in range(40):
+        loss = error(net)
+        loop.update(loss, loss=loss)
+        loop.report(10, lambda n: {"val": error(n).item()}, 20)
+    rows = [json.loads(line) for line in open(out + ".jsonl")]
+    assert [r["step"] for r in rows] == [10, 20, 30, 40]
+    assert ["val" in r for r in rows] == [False, True, False, True]
+    assert rows[0]["loss"] > rows[-1]["loss"] and rows[-1]["val"] < 0.5 * before
+    other = torch.nn.Linear(3, 1)
+    again = common.Loop(Alone(), other, out, 100.0, 0.05, resume=True, size=3)
+    assert again.step == 40 and again.clock.elapsed > 0
+    assert torch.equal(other.weight, net.weight) and torch.equal(again.ema.net.weight, loop.ema.net.weight)
+    again.finish()
+    kept = torch.load(out, weights_only=False)
+    assert kept["size"] == 3 and kept["step"] == 40
+    assert [json.loads(line)["step"] for line in open(out + ".jsonl")][-1] == 40
+
+
+def test_the_teacher_is_asked_for_what_gives_the_target():
+    asked = student.pairs("1:0.9,0:-0.2,0.5:0.4")
+    assert asked == [(0.0, -0.2), (0.5, 0.4), (1.0, 0.9)]
+    gaze = torch.tensor([[[0.0] * 4, [0.25] * 4, [1.0] * 4]])
+    cond = Condition(torch.ones(1, 3, 8), torch.ones(1, 3, 4), torch.ones(1, 3, 4), gaze, torch.ones(1, 3, 4))
+    torch.testing.assert_close(student.calibrated(cond, asked).gaze[0, :, 0], torch.tensor([-0.2, 0.1, 0.9]))
+    assert student.calibrated(cond, None) is cond
+
+
+def test_maps_from_flow_time_are_f16_even_in_an_f32_bundle(tmp_path):
+    tensors = {"flow.layers.0.mod.weight": torch.randn(4, 2), "flow.layers.0.fc1.weight": torch.randn(4, 2)}
+    bundle.write(str(tmp_path / "b.safetensors"), tensors, {}, narrow=export.NARROW)
+    kept = load_file(str(tmp_path / "b.safetensors"))
+    assert kept["flow.layers.0.mod.weight"].dtype == torch.float16 and torch.equal(kept["flow.layers.0.fc1.weight"], tensors["flow.layers.0.fc1.weight"])

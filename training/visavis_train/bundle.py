@@ -51,9 +51,9 @@ def load_net(prefix, net, tensors):
 
 
 def write(path, tensors, config, half=False, narrow=()):
-    """Writes beside `path` and renames, so that a reader never sees half a file. `narrow`: prefixes written as f16 in any case."""
+    """Writes beside `path` and renames, so that a reader never sees half a file. Tensors whose name holds one of `narrow` are f16 in any case."""
     dtype = torch.float16 if half else torch.float32
-    tensors = {k: v.detach().to(torch.float16 if k.startswith(narrow) else dtype).contiguous().clone() for k, v in tensors.items()}
+    tensors = {k: v.detach().to(torch.float16 if any(n in k for n in narrow) else dtype).contiguous().clone() for k, v in tensors.items()}
     bad = [k for k, v in tensors.items() if not torch.isfinite(v).all()]
     if bad:
         raise ValueError(f"not finite: {', '.join(bad)}")

@@ -61,7 +61,8 @@ def vad(audio, hop=240, min_gap=0.25, min_len=0.3):
     return [(max(0, a * hop - pad), min(len(audio), b * hop + pad)) for a, b in out if (b - a) * hop / RATE >= min_len]
 
 
-def _read(path):
+def read(path):
+    """A wav file as 24 kHz mono float32, its loud parts at one level."""
     audio, sr = soundfile.read(path, dtype="float32")
     if audio.ndim > 1:
         audio = audio.mean(1)
@@ -96,7 +97,7 @@ def load_voices(root, split):
             rel = f"{folder}/{f}"
             if not f.endswith(".wav") or not any(rel.startswith(p) for p in SPLITS[split]):
                 continue
-            audio = _read(os.path.join(root, rel))
+            audio = read(os.path.join(root, rel))
             stem = f[:-4]
             if folder == "ami":
                 for tag in ("train", "development", "test"):
@@ -119,7 +120,7 @@ def load_voices(root, split):
 def load_pair(root):
     """The real two-channel call (agent, caller), 24 kHz; used in the test split only."""
     base = os.path.join(root, "dyadic", "Auto_Repairs_40_UTC_")
-    return _read(base + "agent.wav"), _read(base + "caller.wav")
+    return read(base + "agent.wav"), read(base + "caller.wav")
 
 
 class _Speaker:

@@ -46,7 +46,8 @@ class Encoder(Stack):
     def forward(self, x):
         """Standardised frames [B, 4 K, F] -> mu, logvar [B, K, Dz]."""
         b, t, _ = x.shape
-        frames = self.frame(x).reshape(b, t // BLOCK, BLOCK, -1)
+        with torch.autocast("cpu", enabled=False):
+            frames = self.frame(x).reshape(b, t // BLOCK, BLOCK, -1)
         ends = torch.stack([self.mu_token, self.sigma_token]).to(frames.dtype).expand(b, t // BLOCK, 2, -1)
         h = self.run(torch.cat([frames, ends], 2))
         return self.mu(h[:, :, BLOCK]), self.logvar(h[:, :, BLOCK + 1])
@@ -64,7 +65,8 @@ class Decoder(Stack):
         b, k, _ = z.shape
         first = self.latent(z)[:, :, None]
         h = self.run(torch.cat([first, self.frame_token.to(first.dtype).expand(b, k, -1, -1)], 2))
-        return self.out(h[:, :, 1:]).reshape(b, k * BLOCK, -1)
+        with torch.autocast("cpu", enabled=False):  # bf16 would round frames by about 0.3 mm
+            return self.out(h[:, :, 1:].float()).reshape(b, k * BLOCK, -1)
 
 
 class Vae(nn.Module):

@@ -1,4 +1,4 @@
-"""What the training loops share: averages of weights, schedules, checkpoints, logs."""
+"""What the training loops share: averages of weights, schedules, checkpoints, logs, and the loop's end itself."""
 import copy
 import json
 import math
@@ -6,6 +6,7 @@ import os
 import time
 
 import torch
+from torch import nn
 
 
 class Ema:
@@ -72,3 +73,65 @@ class Log:
         print(" ".join(f"{k} {v}" for k, v in row.items()), flush=True)
         with open(self.path, "a") as f:
             f.write(json.dumps(row) + "\n")
+
+
+class Loop:
+    """How every training loop goes on after its loss: gradients averaged over the team, a step at the scheduled rate, the running
+    average of weights, log and checkpoint at `out`.
+
+    `beside`: modules that are trained along and kept by the caller. `resume` goes on where `out` stands. `kept`: what else a checkpoint holds."""
+
+    def __init__(self, team, net, out, minutes, lr, warmup=200, average=0.998, resume=False, beside=(), **kept):
+        self.team, self.net, self.out, self.lr, self.warmup, self.kept = team, net, out, lr, warmup, kept
+        self.trained, self.step, spent = nn.ModuleList([net, *beside]), 0, 0.0
+        self.optim = optimiser(self.trained, lr)
+        state = torch.load(out, weights_only=False) if resume else None
+        if state:
+            net.load_state_dict(state["net"])
+            self.optim.load_state_dict(state["optim"])
+            self.step, spent = state["step"], state["elapsed"]
+        self.ema = Ema(net, average)
+        if state:
+            self.ema.net.load_state_dict(state["ema"])
+            self.ema.steps = self.step
+        self.clock, self.sums = Clock(minutes, spent), {}
+        self.progress = self.clock.progress
+        self.log = Log(out + ".jsonl", resume) if team.leads else None
+
+    def update(self, loss, /, **parts):
+        """One step down `loss`; `parts` are what the next line of the log averages."""
+        set_rate(self.optim, rate(self.lr, self.step, self.progress, self.warmup))
+        self.optim.zero_grad()
+        loss.backward()
+        self.progress = self.team.average(self.trained, self.clock.progress)
+        nn.utils.clip_grad_norm_(self.trained.parameters(), 1.0)
+        self.optim.step()
+        self.ema.update(self.net)
+        self.step += 1
+        for name, value in parts.items():
+            self.sums.setdefault(name, []).append(value.item() if torch.is_tensor(value) else value)
+
+    def report(self, every, measure=None, rarely=None):
+        """The leader, each `every` steps: a line of the log, and each `rarely` steps what `measure` says of the averaged net and a checkpoint."""
+        if self.team.leads and self.step % every == 0:
+            measured = self.step % (rarely or every) == 0
+            self.write(measure if measured else None)
+            if measured:
+                self.keep()
+
+    def write(self, measure=None):
+        means = {name: sum(values) / len(values) for name, values in self.sums.items()}
+        self.sums = {}
+        self.log.write(step=self.step, minutes=self.clock.elapsed / 60, **means, **(measure(self.ema.net) if measure else {}))
+
+    def keep(self):
+        """Writes the checkpoint."""
+        save(self.out, net=self.net.state_dict(), ema=self.ema.net.state_dict(), optim=self.optim.state_dict(), step=self.step,
+             elapsed=self.clock.elapsed, **self.kept)
+
+    def finish(self, measure=None):
+        """The last line and checkpoint; waits for the team."""
+        if self.team.leads:
+            self.write(measure)
+            self.keep()
+        self.team.close()

@@ -10,7 +10,6 @@ rig's lengths, and accelerations (block borders weigh more) held down.
 import argparse
 
 import torch
-from torch import nn
 
 from ..motion import rig
 from ..nets.vae import Vae
@@ -89,29 +88,19 @@ def main():
     net.load_state_dict(first["ema"])
     net.encoder.requires_grad_(False)
     factor = error_factor(args.flow, args.cache)
-    optim, ema, clock, step = common.optimiser(net, args.lr), common.Ema(net, 0.995), common.Clock(args.minutes), 0
-    if args.resume:
-        state = torch.load(args.out, weights_only=False)
-        net.load_state_dict(state["net"]), ema.net.load_state_dict(state["ema"]), optim.load_state_dict(state["optim"])
-        clock, step, ema.steps = common.Clock(args.minutes, state["elapsed"]), state["step"], state["step"]
+    loop = common.Loop(team, net, args.out, args.minutes, args.lr, warmup=50, average=0.995, resume=args.resume, size=first["size"], mean=mean, std=std)
     free = None
     if args.student:
         from ..export import load_flow
         student, state = load_flow(args.student)
         windows = Windows(f"{args.cache}/train.pt", 64, 0, 0, 0, 0)
         free = Free(Rollouts(windows, frozen, mean, std), [(student, state["tau_history"])])
-    log = common.Log(args.out + ".jsonl", args.resume) if team.leads else None
     torch.manual_seed(1)
     check = (held.sample(24, frames) - mean) / std
-    team.seed(2 + step)
-
-    def keep():
-        common.save(args.out, net=net.state_dict(), ema=ema.net.state_dict(), optim=optim.state_dict(), size=first["size"], mean=mean, std=std,
-                    step=step, elapsed=clock.elapsed)
-
-    total, progress = {}, clock.progress
-    while progress < 1:
-        if free and (len(free.z) < 24 or step % 60 == 0):
+    measure = lambda net: evaluate(net, check, mean, std)
+    team.seed(2 + loop.step)
+    while loop.progress < 1:
+        if free and (len(free.z) < 24 or loop.step % 60 == 0):
             free.refresh()
         x = (train.sample(args.batch, frames) - mean) / std
         with torch.autocast("cpu", torch.bfloat16):
@@ -129,24 +118,9 @@ def main():
         parts |= {k: args.smooth * parts[k] for k in ("velocity", "acceleration")}
         if free:
             parts |= {k: args.free * v for k, v in free_losses(y[count:], before, mean, std, weights).items()}
-        common.set_rate(optim, common.rate(args.lr, step, progress, 50))
-        optim.zero_grad()
-        sum(parts.values()).backward()
-        progress = team.average(net, clock.progress)
-        nn.utils.clip_grad_norm_(net.parameters(), 1.0)
-        optim.step()
-        ema.update(net)
-        step += 1
-        if team.leads:
-            total = {k: total.get(k, 0) + v.item() / 50 for k, v in parts.items()}
-            if step % 50 == 0:
-                log.write(step=step, minutes=clock.elapsed / 60, **total, **(evaluate(ema.net, check, mean, std) if step % 100 == 0 else {}))
-                total = {}
-                keep()
-    if team.leads:
-        log.write(step=step, minutes=clock.elapsed / 60, **evaluate(ema.net, check, mean, std))
-        keep()
-    team.close()
+        loop.update(sum(parts.values()), **parts)
+        loop.report(50, measure, 100)
+    loop.finish(measure)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ import argparse
 import os
 
 import torch
-from torch import nn
 
 from ..nets.flow import FlowNet
 from . import common
@@ -139,57 +138,36 @@ def main():
     size = state["size"] if state else SIZES[args.size]
     latent, width_a = train.items[0]["z"][0].shape[-1], train.items[0]["agent"].shape[-1]
     net = FlowNet(latent, width_a, **size)
-    parts = nn.ModuleList([net] + ([audio] if audio else []))
-    optim, clock, step = common.optimiser(parts, args.lr), common.Clock(args.minutes), 0
-    if state:
+    if state and not args.resume:
         net.load_state_dict(state["net"])
-    ema = common.Ema(net, 0.999)
-    if args.resume:
-        optim.load_state_dict(state["optim"])
-        ema.net.load_state_dict(state["ema"])
-        clock, step, ema.steps = common.Clock(args.minutes, state["elapsed"]), state["step"], state["step"]
-    log = common.Log(args.out + ".jsonl", args.resume)
+    loop = common.Loop(team, net, args.out, args.minutes, args.lr, average=0.999, resume=args.resume, beside=[audio] if audio else [], size=size,
+                       latent=latent, audio=width_a, latent_mean=train.mean, latent_std=train.std, metric=metric)
     torch.manual_seed(1)
     checks = [(*held.batch(16), torch.randn(16, args.blocks, latent)) for _ in range(3)]
-    team.seed(2 + step)
+    team.seed(2 + loop.step)
     share = args.apart / (args.apart + 2.2 * (1 - args.apart))  # a step of the pair regime costs about 2.2 of the other
-    seen = {"shared": [], "apart": []}
+    which = torch.Generator().manual_seed(loop.step)  # the same regime in all processes: none waits for the dearer one
+    kinds = {True: apart_loss, False: shared_loss}
+    measure = lambda net: validate(net, checks, metric)
 
-    def keep():
-        common.save(args.out, net=net.state_dict(), ema=ema.net.state_dict(), optim=optim.state_dict(), size=size, latent=latent, audio=width_a,
-                    latent_mean=train.mean, latent_std=train.std, metric=metric, step=step, elapsed=clock.elapsed)
-        if audio:
+    def keep_audio():
+        if audio and team.leads:
             common.save(args.out + ".audio", net=audio.state_dict(), spec=audio.spec, features=width_a)
 
-    which = torch.Generator().manual_seed(step)  # the same regime in all processes: none waits for the dearer one
-    kinds, progress = {True: apart_loss, False: shared_loss}, clock.progress
     if args.compile:
         with torch.no_grad():
             apart_loss(net, *train.batch(2), metric, 0), shared_loss(net, *train.batch(2), metric, 0)  # makes the tables
         kinds = {k: torch.compile(f, dynamic=False) for k, f in kinds.items()}
-    while progress < 1:
+    while loop.progress < 1:
         apart = torch.rand(1, generator=which).item() < share
         z, cond = train.batch(args.batch)
         loss = kinds[apart](net, z, cond, metric, args.slip)
-        common.set_rate(optim, common.rate(args.lr, step, progress))
-        optim.zero_grad()
-        loss.backward()
-        progress = team.average(parts, clock.progress)
-        nn.utils.clip_grad_norm_(parts.parameters(), 1.0)
-        optim.step()
-        ema.update(net)
-        seen["apart" if apart else "shared"].append(loss.item())
-        step += 1
-        if team.leads and step % 100 == 0:
-            row = {k: sum(v) / len(v) for k, v in seen.items() if v}
-            seen = {"shared": [], "apart": []}
-            log.write(step=step, minutes=clock.elapsed / 60, **row, **(validate(ema.net, checks, metric) if step % 500 == 0 else {}))
-            if step % 500 == 0 or step in (100, 200):
-                keep()
-    if team.leads:
-        log.write(step=step, minutes=clock.elapsed / 60, **validate(ema.net, checks, metric))
-        keep()
-    team.close()
+        loop.update(loss, **{"apart" if apart else "shared": loss})
+        loop.report(100, measure, 500)
+        if loop.step % 500 == 0:
+            keep_audio()
+    keep_audio()
+    loop.finish(measure)
 
 
 if __name__ == "__main__":

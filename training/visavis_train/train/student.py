@@ -9,8 +9,8 @@ the user is seen from where the generated body stands. A teacher pass over a win
 import argparse
 import os
 
+import numpy as np
 import torch
-from torch import nn
 
 from ..nets.flow import GAZE, Condition, FlowNet
 from ..nets.stream import DecoderStream, Stream, branches, combine, history_time, midpoint
@@ -89,6 +89,19 @@ def targets(cond, gaze):
     return Condition(cond.user, cond.agent, cond.voice, wish.expand_as(cond.gaze).clone(), flags)
 
 
+def calibrated(cond, pairs):
+    """The condition with its gaze targets replaced by what the teacher must be asked for to give them: `pairs` are (target, asked)."""
+    if not pairs:
+        return cond
+    asked = np.interp(cond.gaze.numpy(), *zip(*pairs))
+    return Condition(cond.user, cond.agent, cond.voice, torch.from_numpy(asked).float(), cond.flags)
+
+
+def pairs(text):
+    """"0:-0.1,0.5:0.45,1:1" -> ascending (target, asked) pairs."""
+    return sorted(tuple(float(v) for v in pair.split(":")) for pair in text.split(","))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     for name in ("cache", "vae", "flow", "out"):
@@ -102,6 +115,8 @@ def main():
     parser.add_argument("--tau-history", type=float, default=0.9)
     parser.add_argument("--guidance", type=float, default=1.5)
     parser.add_argument("--gaze-guidance", type=float, default=2.0)
+    parser.add_argument("--gaze-map", type=pairs, metavar="TARGET:ASKED,...", help="what the teacher is asked for where the student is asked for a "
+                        "target (linear between), so that the student gives it: from roll-outs of the teacher")
     parser.add_argument("--clean-from", type=float, default=0.3,
                         help="the teacher imputes history below this flow time and sees it at --tau-history from there; above 1: always imputed")
     parser.add_argument("--temperature", type=float, default=0.75, help="scale of the noise, as sessions use it")
@@ -122,32 +137,21 @@ def main():
     teacher.eval().requires_grad_(False)
     net.load_state_dict((torch.load(args.init, weights_only=False) if args.init else base)["ema"])
     metric, kept = base["metric"], {k: base[k] for k in ("size", "latent", "audio", "latent_mean", "latent_std", "metric")}
-    optim, ema, clock, step = common.optimiser(net, args.lr), common.Ema(net, 0.998), common.Clock(args.minutes), 0
-    if args.resume:
-        state = torch.load(args.out, weights_only=False)
-        net.load_state_dict(state["net"])
-        ema.net.load_state_dict(state["ema"])
-        optim.load_state_dict(state["optim"])
-        clock, step, ema.steps = common.Clock(args.minutes, state["elapsed"]), state["step"], state["step"]
-    log, rollouts = common.Log(args.out + ".jsonl", args.resume) if team.leads else None, Rollouts(windows, vae, mean, std)
-    which = torch.Generator().manual_seed(step)  # the same kind of pass in all processes: none waits for the dearer one
-    team.seed(4 + step)
-    store, losses, own_losses = [], [], []
-
-    def keep():
-        common.save(args.out, net=net.state_dict(), ema=ema.net.state_dict(), optim=optim.state_dict(), step=step, elapsed=clock.elapsed,
-                    tau_history=args.tau_history, guidance=args.guidance, gaze_guidance=args.gaze_guidance, **kept)
-
-    progress = clock.progress
-    while progress < 1:
+    loop = common.Loop(team, net, args.out, args.minutes, args.lr, warmup=50, resume=args.resume, tau_history=args.tau_history, guidance=args.guidance,
+                       gaze_guidance=args.gaze_guidance, **kept)
+    rollouts = Rollouts(windows, vae, mean, std)
+    which = torch.Generator().manual_seed(loop.step)  # the same kind of pass in all processes: none waits for the dearer one
+    team.seed(4 + loop.step)
+    store = []
+    while loop.progress < 1:
         gaze = bool(torch.rand(1) < 0.6)
-        own = bool(torch.rand(1, generator=which) < args.own * min(1.0, step / 200))
+        own = bool(torch.rand(1, generator=which) < args.own * min(1.0, loop.step / 200))
         if own:
-            history, eps, cond = rollouts.make(ema.net, args.teach, gaze, args.tau_history, args.temperature)
+            history, eps, cond = rollouts.make(loop.ema.net, args.teach, gaze, args.tau_history, args.temperature)
         else:
             history, cond = windows.batch(args.teach)
             cond, eps = targets(cond, gaze), args.temperature * torch.randn_like(history)
-        wish = teach(teacher, history, eps, cond, gaze, args.guidance, args.gaze_guidance,
+        wish = teach(teacher, history, eps, calibrated(cond, args.gaze_map) if gaze else cond, gaze, args.guidance, args.gaze_guidance,
                      tau_history=args.tau_history, clean_from=args.clean_from)
         for row in range(args.teach):
             store.append((history[row], eps[row], wish[row], pick(cond, row), own))
@@ -161,24 +165,10 @@ def main():
             with torch.autocast("cpu", torch.bfloat16):
                 x1 = net.forward_pair(noisy(h, tau, e), tau, e, torch.zeros(1, 1), c)
             error = x1_error(x1, w, metric)[:, 4:].mean(1)
-            loss = error.mean()
-            common.set_rate(optim, common.rate(args.lr, step, progress, 50))
-            optim.zero_grad()
-            loss.backward()
-            progress = team.average(net, clock.progress)
-            nn.utils.clip_grad_norm_(net.parameters(), 1.0)
-            optim.step()
-            ema.update(net)
-            step += 1
-            losses.append(loss.item())
-            own_losses += [v for v, i in zip(error.tolist(), rows) if store[i][4]]
-            if team.leads and step % 100 == 0:
-                log.write(step=step, minutes=clock.elapsed / 60, loss=sum(losses) / len(losses), own=sum(own_losses) / max(1, len(own_losses)))
-                losses, own_losses = [], []
-                keep()
-    if team.leads:
-        keep()
-    team.close()
+            own = [v for v, i in zip(error.tolist(), rows) if store[i][4]]
+            loop.update(error.mean(), loss=error.mean(), **({"own": sum(own) / len(own)} if own else {}))
+            loop.report(100)
+    loop.finish()
 
 
 if __name__ == "__main__":

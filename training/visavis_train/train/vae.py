@@ -2,8 +2,9 @@
 
     python -m visavis_train.train.vae --corpus DIR --out runs/vae.pt --minutes 25
 
-Loss: standardised features with the root, hands, feet and head weighted up; joint positions in metres after the root is integrated
-over short horizons, their velocity and acceleration (across block borders too), speed of feet that the data keeps planted; KL.
+Loss: standardised features with the root, hands, feet and head weighted up; angles between the joints' rotations; joint positions in metres
+after the root is integrated over short horizons, their velocity and acceleration (across block borders above all), speed of feet that the data
+keeps planted; KL.
 """
 import argparse
 import os
@@ -54,13 +55,14 @@ def losses(x, y, mean, std, mu, logvar, weights, jw):
     a, b = x * std + mean, y * std + mean
     p, q = world(a, HORIZON), world(b, HORIZON)
     rotation = (rotations_apart(a, b) * jw).mean()
-    norm = lambda d: ((d.square().sum(-1) + 1e-8).sqrt() * jw).mean()
+    norm = lambda d, w=1.0: ((d.square().sum(-1) + 1e-8).sqrt() * jw * w).mean()
     vp, vq = p.diff(dim=2), q.diff(dim=2)
+    border = 1 + 2.0 * (torch.arange(HORIZON - 2) % 4 >= 2).float()[:, None]  # accelerations across block borders weigh more
     feet = list(FEET)
     planted = (vp[..., feet, :].square().sum(-1) < 0.002 ** 2).float()
     slide = ((vq[..., feet, :].square().sum(-1) + 1e-8).sqrt() * planted).sum() / (planted.sum() + 1)
     kl = 0.5 * (mu.square() + logvar.exp() - 1 - logvar).sum(-1).mean()
-    return {"feature": feature, "rotation": 0.5 * rotation, "position": 4 * norm(p - q), "velocity": 20 * norm(vp - vq), "acceleration": 10 * norm(vp.diff(dim=2) - vq.diff(dim=2)),
+    return {"feature": feature, "rotation": 2.5 * rotation, "position": 4 * norm(p - q), "velocity": 20 * norm(vp - vq), "acceleration": 10 * norm(vp.diff(dim=2) - vq.diff(dim=2), border),
             "slide": 5 * slide, "kl": kl}
 
 
@@ -146,21 +148,11 @@ def main():
     else:
         start_from_principal(net, (every - mean) / std, weights)
         del every
-    optim, ema = common.optimiser(net, args.lr), common.Ema(net, 0.998)
-    clock, step = common.Clock(args.minutes), 0
-    if state:
-        optim.load_state_dict(state["optim"])
-        ema.net.load_state_dict(state["ema"])
-        clock, step, ema.steps = common.Clock(args.minutes, state["elapsed"]), state["step"], state["step"]
-    log = common.Log(args.out + ".jsonl", args.resume)
+    loop = common.Loop(team, net, args.out, args.minutes, args.lr, resume=args.resume, size=size, mean=mean, std=std)
     torch.manual_seed(1)
     check = ((held if held.items else train).sample(32, frames) - mean) / std
-    team.seed(2 + step)
-    total, progress = {}, clock.progress
-    def keep():
-        common.save(args.out, net=net.state_dict(), ema=ema.net.state_dict(), optim=optim.state_dict(), size=size, mean=mean, std=std,
-                    step=step, elapsed=clock.elapsed)
-
+    measure = lambda net: evaluate(net, check, mean, std)
+    team.seed(2 + loop.step)
     scale = {"kl": args.kl, "velocity": args.smooth, "acceleration": args.smooth}
 
     def forward(x):
@@ -173,29 +165,11 @@ def main():
         with torch.no_grad():
             net(check[:2])  # makes the tables
         forward = torch.compile(forward, dynamic=False)
-    while progress < 1:
+    while loop.progress < 1:
         loss, parts = forward((train.sample(args.batch, frames) - mean) / std)
-        common.set_rate(optim, common.rate(args.lr, step, progress))
-        optim.zero_grad()
-        loss.backward()
-        progress = team.average(net, clock.progress)
-        nn.utils.clip_grad_norm_(net.parameters(), 1.0)
-        optim.step()
-        ema.update(net)
-        step += 1
-        if not team.leads:
-            continue
-        for k, v in parts.items():
-            total[k] = total.get(k, 0) + v.item() / 100
-        if step % 100 == 0:
-            log.write(step=step, minutes=clock.elapsed / 60, **total, **(evaluate(ema.net, check, mean, std) if step % 200 == 0 else {}))
-            total = {}
-        if step % 200 == 0:
-            keep()
-    if team.leads:
-        log.write(step=step, minutes=clock.elapsed / 60, **evaluate(ema.net, check, mean, std))
-        keep()
-    team.close()
+        loop.update(loss, **parts)
+        loop.report(100, measure, 200)
+    loop.finish(measure)
 
 
 if __name__ == "__main__":

@@ -51,8 +51,8 @@ class Windows:
             voice = item["voice"][first - 4:first - 4 + 4 * n].float().reshape(n, -1)
         else:
             agent, voice = (self.hear(item, k, s, n) for k, s in ((0, first), (1, first - 4)))
-        kind = int(torch.randint(0, 6, (1,))) if self.jitter else 2
-        gaze = item["gaze"][frames].mean().expand(4 * n) if kind == 5 else smooth(item["gaze"], (1, 30, 60, 60, 120)[kind])[frames]
+        kind = int(torch.randint(0, 8, (1,))) if self.jitter else 2
+        gaze = item["gaze"][frames].mean().expand(4 * n) if kind > 3 else smooth(item["gaze"], (1, 30, 60, 120)[kind])[frames]
         flags = torch.tensor([1.0, *map(float, item["has"]), 1.0])
         return z, user, agent, voice, gaze.reshape(n, 4), flags
 
