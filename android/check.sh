@@ -54,6 +54,19 @@ if [ ! -x "$kit/build.sh" ]; then
   exit 0
 fi
 
+echo '-- the microphone through oboe: type check (its C++ needs the NDK)'
+if ! DOCS_RS=1 "$kit/build.sh" --check android/native --features oboe >"$out/oboe.log" 2>&1; then
+  # A check makes no library, which cargo-ndk then misses: that alone is no failure, if the check itself came to its end.
+  if ! grep -q 'Finished' "$out/oboe.log" || ! tail -3 "$out/oboe.log" | grep -q 'No cdylib file found to copy'; then
+    tail -40 "$out/oboe.log"
+    exit 1
+  fi
+fi
+if grep -qE '^(warning|error)' <(grep -v 'build-std\|unstable' "$out/oboe.log"); then
+  grep -E -A6 '^(warning|error)' "$out/oboe.log" >&2
+  exit 1
+fi
+
 echo '-- the Android library: imports against API 29, ELF checks'
 so=$("$kit/build.sh" android/native --profile dist)
 size=$(stat -c %s "$so")

@@ -115,6 +115,7 @@ final class Motion extends Thread {
 
     private void converse(VisavisSession session) throws InterruptedException {
         VisavisMicrophone microphone = null;
+        Speaker speaker = speaker();
         boolean tried = false;
         int fed = 0;
         float gazeNow = Float.NaN;
@@ -129,11 +130,15 @@ final class Motion extends Thread {
                     tried = true;
                     microphone = open();
                 }
-                feed(session, agent, fed, true);
+                FloatBuffer voice = part(agent, fed);
+                session.pushAgentAudio(voice, agent.rate);
+                if (speaker != null) {
+                    speaker.play(voice);
+                }
                 if (microphone != null) {
                     microphone.pump(session);
                 } else {
-                    feed(session, user, fed, false);
+                    session.pushUserAudio(part(user, fed), user.rate);
                 }
                 fed++;
                 session.pushUserHead(userX, 1.65f, userZ, due);
@@ -158,6 +163,19 @@ final class Motion extends Thread {
             if (microphone != null) {
                 microphone.close();
             }
+            if (speaker != null) {
+                speaker.close();
+            }
+        }
+    }
+
+    /** The agent's voice is heard where the device has an output for it; motion goes on without. */
+    private Speaker speaker() {
+        try {
+            return new Speaker(agent.rate, samples(agent));
+        } catch (IllegalArgumentException | UnsupportedOperationException e) {
+            note = String.valueOf(e.getMessage());
+            return null;
         }
     }
 
@@ -177,16 +195,17 @@ final class Motion extends Thread {
         stats = now;
     }
 
+    /** Samples of a block. */
+    private static int samples(Wav wav) {
+        return wav.rate * FrameLayout.FRAMES / 30;
+    }
+
     /** The voice of block {@code block}, over and over. */
-    private static void feed(VisavisSession session, Wav wav, int block, boolean agent) {
-        int count = wav.rate * FrameLayout.FRAMES / 30;
+    private static FloatBuffer part(Wav wav, int block) {
+        int count = samples(wav);
         int from = (int) ((long) block * count % Math.max(1, wav.samples.capacity() - count));
         FloatBuffer part = wav.samples.duplicate();
         part.position(from).limit(Math.min(from + count, part.capacity()));
-        if (agent) {
-            session.pushAgentAudio(part, wav.rate);
-        } else {
-            session.pushUserAudio(part, wav.rate);
-        }
+        return part;
     }
 }

@@ -1,0 +1,27 @@
+package android.media;
+
+public final class AudioFormat {
+    public static final int CHANNEL_OUT_MONO = 4;
+    public static final int ENCODING_PCM_FLOAT = 4;
+
+    private AudioFormat() {
+    }
+
+    public static class Builder {
+        public Builder setSampleRate(int sampleRate) {
+            return this;
+        }
+
+        public Builder setEncoding(int encoding) {
+            return this;
+        }
+
+        public Builder setChannelMask(int channelMask) {
+            return this;
+        }
+
+        public AudioFormat build() {
+            return new AudioFormat();
+        }
+    }
+}
