@@ -10,7 +10,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")"
 [ $# -ge 1 ] || { sed -n '2,8s/^# \{0,1\}//p' "$0"; exit 2; }
 seconds=$1
 shift
-targets=(bundle_bytes bundle_lies wav csv session)
+targets=(bundle_bytes bundle_lies wav csv session capi)
 [ $# -eq 0 ] || targets=("$1")
 replay=${2:-}
 
@@ -44,6 +44,6 @@ for target in "${targets[@]}"; do
   status=0
   "$program" "${limits[@]}" "${for_long[@]}" -artifact_prefix="artifacts/$target/" "$out/work/$target" "corpus/$target" \
     >"$out/work/$target.log" 2>&1 || status=$?
-  grep -E '^(stat::number_of_executed_units|stat::peak_rss_mb|==[0-9]+==|SUMMARY|.*panicked)' "$out/work/$target.log" || true
+  grep -E '^(stat::number_of_executed_units|stat::average_exec_per_sec|stat::peak_rss_mb|==[0-9]+==|SUMMARY|.*panicked)' "$out/work/$target.log" || true
   [ "$status" = 0 ] || { echo "fuzz/$target: exit code $status; see fuzz/artifacts/$target" >&2; exit 1; }
 done

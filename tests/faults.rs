@@ -93,6 +93,32 @@ fn a_trace_on_a_full_disk_leaves_nothing() {
     }
 }
 
+/// The other writers: bundles, evaluations, reports.
+#[test]
+fn no_writer_leaves_half_a_file() {
+    let scratch = Scratch::new("faults-writers");
+    let (f16, i8) = (golden_path("tiny.safetensors"), scratch.path("i8.safetensors"));
+    let (f16, i8) = (text(&f16), text(&i8));
+    let (file, folder) = (scratch.path("result"), scratch.path("results"));
+    let (file, folder) = (text(&file), text(&folder));
+    let made = limited(u64::MAX, &["quantize", f16, i8, "--scheme", "i8"]);
+    assert_eq!(made.status.code(), Some(0), "{}", String::from_utf8_lossy(&made.stderr));
+    let eval = ["eval", "--model", f16, "--quick", "--windows", "1", "--sampler", "single"];
+    let report = ["report", "--reference", f16, "--candidate", i8, "--quick"];
+    for args in [
+        &["quantize", f16, file, "--scheme", "i8"][..],
+        &[&eval[..], &["--json", file]].concat(),
+        &[&eval[..], &["--md", file]].concat(),
+        &[&report[..], &["--numerics-only", file]].concat(),
+        &[&report[..], &["--out", folder]].concat(),
+    ] {
+        disk_error(&limited(100, args));
+        let left = names(&scratch.path(""));
+        assert!(!left.iter().any(|name| name == "result" || name.starts_with('.')), "{args:?} left {left:?}");
+    }
+    assert!(names(Path::new(folder)).is_empty());
+}
+
 #[test]
 fn a_full_standard_output_is_an_error() {
     let full = OpenOptions::new().write(true).open("/dev/full").expect("/dev/full");

@@ -4,6 +4,7 @@ mod common;
 
 use common::{Inputs, poll_blocks, tiny};
 use visavis::frame::{BLOCK_FRAMES, FPS, Frame, Sampler};
+use visavis::nn::PERIOD;
 use visavis::session::{Anchoring, Session, SessionOptions};
 
 const DAY: u64 = 24 * 3600 * FPS as u64 / BLOCK_FRAMES as u64;
@@ -24,8 +25,29 @@ fn motion(first_block: u64, sampler: Sampler) -> (Vec<Frame>, Session) {
     let inputs = Inputs::circling(common::block_seconds(BLOCKS), 48_000);
     session.push_agent_audio(&inputs.agent, inputs.rate).unwrap();
     session.push_user_audio(&inputs.user, inputs.rate).unwrap();
-    inputs.path.iter().for_each(|(t, p)| session.push_user_head(*p, start + t).unwrap());
+    for (i, (t, p)) in inputs.path.iter().enumerate() {
+        // Every third sample falls on a frame, to the bit; what lies between two samples would depend on how their times round.
+        let frame = first_block * BLOCK_FRAMES as u64 + i as u64 / 3;
+        let time = if i % 3 == 0 { frame as f64 / f64::from(FPS) } else { start + t };
+        session.push_user_head(*p, time).unwrap();
+    }
     (poll_blocks(&mut session, BLOCKS), session)
+}
+
+/// All phases come again after a period: everything else that knows the time must not change a bit either.
+#[test]
+fn whole_periods_later_motion_has_the_same_bits() {
+    for sampler in [Sampler::Midpoint(4), Sampler::Single] {
+        let (now, _) = motion(0, sampler);
+        for periods in [1, 4] {
+            let (later, _) = motion(periods * PERIOD, sampler);
+            for (a, b) in now.iter().zip(&later) {
+                assert_eq!(*a, Frame { index: a.index, time: a.time, ..b.clone() }, "{sampler}, {periods} periods");
+            }
+        }
+        let (other, _) = motion(PERIOD + 1, sampler);
+        assert!(now.iter().zip(&other).any(|(a, b)| a.global != b.global), "keys are rounded at other angles");
+    }
 }
 
 /// Positions of tokens enter through rotary phases, which are relative: but for their rounding, motion does not know the hour.

@@ -7,8 +7,14 @@ use glam::Vec3;
 use libfuzzer_sys::fuzz_target;
 use visavis::error::ErrorKind;
 use visavis::frame::{Root, Sampler};
+use std::cell::RefCell;
 use visavis::session::{Anchoring, Budget, Governor, Session, SessionOptions};
 use visavis_fuzz::engine;
+
+thread_local! {
+    /// The session of most executions: making one takes longer than using it, and a reset is to leave nothing behind.
+    static KEPT: RefCell<Option<Session>> = const { RefCell::new(None) };
+}
 
 #[derive(Debug, Arbitrary)]
 struct Options {
@@ -61,6 +67,18 @@ fn governor(budget: Option<f32>) -> Governor {
 
 fuzz_target!(|data: &[u8]| {
     let mut u = Unstructured::new(data);
+    if !matches!(u.arbitrary::<u8>(), Ok(0..16)) {
+        return KEPT.with_borrow_mut(|kept| {
+            let make = || engine().session(SessionOptions::default()).expect("a session");
+            let session = kept.get_or_insert_with(make);
+            session.set_gaze(None).expect("no target");
+            session.set_guidance(1.3, 2.5).expect("weights");
+            session.set_sampler(Sampler::Single).expect("a student");
+            session.set_governor(Governor::Off).expect("none");
+            session.reset().expect("a reset");
+            drive(session, &mut u);
+        });
+    }
     let Ok(o) = Options::arbitrary(&mut u) else { return };
     let options = SessionOptions {
         seed: o.seed,
@@ -79,16 +97,19 @@ fuzz_target!(|data: &[u8]| {
         Ok(session) => session,
         Err(e) => return assert_eq!(e.kind(), ErrorKind::Argument, "{e}"),
     };
-    let mut next = None;
-    // Few blocks an execution: many executions.
-    let mut blocks = 0;
-    while let Ok(step) = Step::arbitrary(&mut u) {
+    drive(&mut session, &mut u);
+});
+
+/// Takes steps while there are any, and few blocks: many executions are worth more.
+fn drive(session: &mut Session, u: &mut Unstructured) {
+    let (mut next, mut blocks) = (None, 0);
+    while let Ok(step) = Step::arbitrary(u) {
         if blocks >= 6 || u.is_empty() {
             break;
         }
-        blocks += take(&mut session, step, &mut next);
+        blocks += take(session, step, &mut next);
     }
-});
+}
 
 /// Takes a step; returns the number of blocks that were computed.
 fn take(session: &mut Session, step: Step, next: &mut Option<u64>) -> u32 {

@@ -18,17 +18,13 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// Takes [`TINY`] apart, once.
-    pub fn tiny() -> &'static Self {
-        static PARTS: OnceLock<Parts> = OnceLock::new();
-        PARTS.get_or_init(|| {
-            let (_, header) = SafeTensors::read_metadata(TINY).expect("the tiny bundle");
-            let config = &header.metadata().as_ref().expect("metadata")[CONFIG_KEY];
-            let file = SafeTensors::deserialize(TINY).expect("the tiny bundle");
-            let tensors =
-                file.iter().map(|(n, v)| (n.to_owned(), (v.dtype(), v.shape().to_vec(), v.data().to_vec())));
-            Self { config: serde_json::from_str(config).expect("a config"), tensors: tensors.collect() }
-        })
+    /// Takes [`TINY`] apart.
+    fn tiny() -> Self {
+        let (_, header) = SafeTensors::read_metadata(TINY).expect("the tiny bundle");
+        let config = &header.metadata().as_ref().expect("metadata")[CONFIG_KEY];
+        let file = SafeTensors::deserialize(TINY).expect("the tiny bundle");
+        let tensors = file.iter().map(|(n, v)| (n.to_owned(), (v.dtype(), v.shape().to_vec(), v.data().to_vec())));
+        Self { config: serde_json::from_str(config).expect("a config"), tensors: tensors.collect() }
     }
 
     /// A sound container; `None` when a tensor's data do not fit its shape.
@@ -42,16 +38,26 @@ impl Parts {
     }
 }
 
-/// An engine that costs little: the tiny bundle with one layer a network, windows of two blocks and an idle clip of one,
-/// loaded once.
-pub fn engine() -> Arc<Engine> {
-    static ENGINE: OnceLock<Arc<Engine>> = OnceLock::new();
-    let load = || Engine::from_bytes(small().bytes().expect("a container"), "small").expect("the small bundle loads");
-    Arc::clone(ENGINE.get_or_init(load))
+/// A bundle that costs little: the tiny one with one layer a network, windows of two blocks and an idle clip of one.
+pub fn small() -> &'static Parts {
+    static PARTS: OnceLock<Parts> = OnceLock::new();
+    PARTS.get_or_init(make_small)
 }
 
-fn small() -> Parts {
-    let mut parts = Parts::tiny().clone();
+/// [`small`] as a file.
+pub fn small_bundle() -> &'static [u8] {
+    static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
+    BYTES.get_or_init(|| small().bytes().expect("a container"))
+}
+
+/// The engine of [`small`], loaded once.
+pub fn engine() -> Arc<Engine> {
+    static ENGINE: OnceLock<Arc<Engine>> = OnceLock::new();
+    Arc::clone(ENGINE.get_or_init(|| Engine::from_slice(small_bundle(), "small").expect("the small bundle loads")))
+}
+
+fn make_small() -> Parts {
+    let mut parts = Parts::tiny();
     let config = &mut parts.config;
     for network in ["vae", "flow"] {
         config[network]["layers"] = 1.into();

@@ -7,6 +7,7 @@ use crate::engine::Engine;
 use crate::error::Result;
 use crate::frame::{FPS, FRAME_SAMPLES, Frame, Root};
 use crate::metrics::Summary;
+use crate::pose::GuardStats;
 use crate::recording::Recording;
 use crate::session::SessionOptions;
 use glam::Vec3;
@@ -32,6 +33,10 @@ pub struct Endurance {
     pub finite: bool,
     /// Times that the plausibility guard had to hold a pose, a minute of motion.
     pub trips_a_minute: f64,
+    /// Part of all frames that it held.
+    pub held: f64,
+    /// Whether the guard had to step in so often that the bundle is defective ([`GuardStats::is_defective`]).
+    pub defective: bool,
     /// The agent's mean distance from where it started, in the last period, metres.
     pub wandered: f64,
 }
@@ -90,8 +95,12 @@ impl Endurance {
             let user: Vec<Vec3> = (0..length * periods).map(|i| circling(i % length, length)).collect();
             let options = SessionOptions { start: Root::default(), seed: run as u64, ..options.clone() };
             let outcome = generate(engine, options, voices, user)?;
-            Ok(Run { trips: outcome.stats.guard.trips, ..Run::of(&outcome.recording, length) })
+            Ok(Run { guard: outcome.stats.guard, ..Run::of(&outcome.recording, length) })
         })?;
+        let (trips, held) =
+            results.iter().fold((0, 0), |(trips, held), run| (trips + run.guard.trips, held + run.guard.held_frames));
+        let guard = GuardStats { trips, held_frames: held, ..GuardStats::default() };
+        let frames = runs * periods * length;
         let metric = |(name, value, least): &Metric| {
             let mean =
                 |pick: fn(&Run) -> &Summary| super::figures::mean(results.iter().filter_map(|run| value(pick(run))));
@@ -103,8 +112,9 @@ impl Endurance {
             runs,
             changes: METRICS.iter().filter_map(metric).collect(),
             finite: results.iter().all(|run| run.finite),
-            trips_a_minute: results.iter().map(|run| run.trips as f64).sum::<f64>() * 60.0
-                / (runs * period * periods) as f64,
+            trips_a_minute: trips as f64 * 60.0 / (runs * period * periods) as f64,
+            held: held as f64 / frames as f64,
+            defective: guard.is_defective(frames as u64),
             wandered: results.iter().map(|run| run.wandered).sum::<f64>() / runs as f64,
         })
     }
@@ -114,7 +124,7 @@ struct Run {
     first: Summary,
     last: Summary,
     finite: bool,
-    trips: u64,
+    guard: GuardStats,
     wandered: f64,
 }
 
@@ -140,7 +150,7 @@ impl Run {
             first: part(LEAD, length),
             last: part(last + LEAD, frames.len()),
             finite: frames.iter().all(finite),
-            trips: 0,
+            guard: GuardStats::default(),
             wandered: frames[last..].iter().map(away).sum::<f64>() / length as f64,
         }
     }

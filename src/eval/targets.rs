@@ -5,7 +5,7 @@ use super::figures::Row;
 use super::reaction::Reaction;
 use super::reconstruction::Reconstruction;
 use super::{Dial, Report};
-use crate::pose::DEFECTIVE_TRIPS_A_MINUTE;
+use crate::pose::{DEFECTIVE_HELD, DEFECTIVE_TRIPS_A_MINUTE};
 use serde::Serialize;
 
 /// A target and where the model stands.
@@ -142,10 +142,15 @@ fn endurance(e: &Endurance) -> Vec<Verdict> {
         ),
         verdict("endurance: no NaN", "none".into(), if e.finite { "none" } else { "some" }.into(), Some(e.finite)),
         verdict(
-            "endurance: plausibility guard, trips a minute",
-            format!("at most {DEFECTIVE_TRIPS_A_MINUTE}; above it the bundle is defective"),
-            format!("{:.2}", e.trips_a_minute),
-            Some(e.trips_a_minute <= DEFECTIVE_TRIPS_A_MINUTE),
+            "endurance: plausibility guard",
+            format!("at most {DEFECTIVE_TRIPS_A_MINUTE} trip a minute and {} % of frames held", 100.0 * DEFECTIVE_HELD),
+            format!(
+                "{:.2} trips a minute, {:.1} % held{}",
+                e.trips_a_minute,
+                100.0 * e.held,
+                if e.defective { ": this bundle is defective" } else { "" }
+            ),
+            Some(!e.defective),
         ),
         at_most("endurance: bone lengths before fitting", "within 0.015 on average", bones, 0.015),
     ]

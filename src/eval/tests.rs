@@ -65,6 +65,33 @@ fn a_report_is_whole_and_the_same_on_any_number_of_threads() {
     }
 }
 
+/// A bundle whose poses no body could take is called defective, whether the guard trips again and again or holds without end.
+#[test]
+fn a_bundle_that_trips_the_guard_is_defective() {
+    let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/goldens/tiny.safetensors")).unwrap();
+    let (header, metadata) = safetensors::SafeTensors::read_metadata(&bytes).unwrap();
+    let (from, to) = metadata.info("stats.pose_std").unwrap().data_offsets;
+    let endurance = |factor: f32| {
+        let mut bytes = bytes.clone();
+        for place in bytes[8 + header + from..8 + header + to].chunks_exact_mut(2) {
+            let value = half::f16::from_le_bytes([place[0], place[1]]).to_f32();
+            place.copy_from_slice(&half::f16::from_f32(factor * value).to_le_bytes());
+        }
+        let engine = Engine::from_bytes(bytes, "tiny").unwrap();
+        let options =
+            EvalOptions { windows: 2, samplers: vec![Sampler::Single], quick: true, ..EvalOptions::default() };
+        let report = evaluate(&engine, &made_up(&engine.config().rig, &talk()), None, &options, &|_| {}).unwrap();
+        let verdict = report.verdicts.iter().find(|v| v.what == "endurance: plausibility guard").unwrap().clone();
+        assert_eq!(report.to_text().contains("this bundle is defective"), verdict.met == Some(false));
+        (report.endurance.unwrap(), verdict)
+    };
+    let (sound, verdict) = endurance(0.25);
+    assert!(!sound.defective && verdict.met == Some(true), "{verdict:?}");
+    let (wild, verdict) = endurance(100.0);
+    assert!(wild.defective && wild.held > 0.5 && verdict.met == Some(false), "{verdict:?}");
+    assert!(wild.finite, "what is shown is finite all the same");
+}
+
 #[test]
 fn spoilt_motion_is_told_from_the_corpus() {
     let engine = tiny();

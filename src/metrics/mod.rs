@@ -12,7 +12,7 @@
 //! | support-foot speed | [`support_foot_speed`] | ours |
 //! | wrist var | [`wrist_speed`] | SARAH 4 |
 //! | head angle | [`head_angle`], [`gaze_score`] | SARAH 3.4, 4 |
-//! | seam | [`seam`] | ours |
+//! | seam | [`seam`], [`switch_seam`] | ours |
 //! | beat | [`beat`] | ours |
 //! | APE, PCK | [`ape`], [`pck`] | DRAM eq. 10, 11 |
 //! | bone length deviation | [`bone_deviation`] | ours |
@@ -41,7 +41,7 @@ pub use frechet::{frechet, mean_frechet};
 pub use gaze::{gaze_score, gaze_scores, head_angle};
 pub use keypoints::{Space, ape, pck};
 pub use moments::{Moments, acceleration_moments, pose_moments};
-pub use seam::seam;
+pub use seam::{seam, switch_seam};
 pub use speech::{envelope, is_speaking, speech_frames};
 pub use speed::{JointSpeed, joint_speed, wrist_speed, wrist_speeds};
 pub use summary::{Split, Summary};

@@ -9,14 +9,25 @@ use crate::frame::{BLOCK_FRAMES, Frame};
 /// boundary (around its first and its last frame) and two lie inside. `None` for less than a block, or when nothing inside
 /// blocks accelerates (below 1e-9 m/frame²), where the ratio says nothing.
 pub fn seam(frames: &[Frame]) -> Option<f64> {
-    let acceleration = |across: bool| {
-        mean(frames.windows(3).filter(|w| crosses(w[1].index) == across).flat_map(|w| {
+    ratio(frames, |w| crosses(w[1].index))
+}
+
+/// The same across those boundaries alone at which the sampler changes: how well a governor's steps are hidden. `None` where it
+/// never changes, and as [`seam`].
+pub fn switch_seam(frames: &[Frame]) -> Option<f64> {
+    ratio(frames, |w| crosses(w[1].index) && w[0].sampler != w[2].sampler)
+}
+
+/// Mean acceleration around the frames that `counts` picks, over that inside blocks.
+fn ratio(frames: &[Frame], counts: impl Fn(&[Frame]) -> bool) -> Option<f64> {
+    let acceleration = |counts: &dyn Fn(&[Frame]) -> bool| {
+        mean(frames.windows(3).filter(|w| counts(w)).flat_map(|w| {
             let joints = w[0].global.iter().zip(&w[1].global).zip(&w[2].global);
             joints.map(|((a, b), c)| f64::from((a.position - 2.0 * b.position + c.position).length()))
         }))
     };
-    let inside = acceleration(false)?;
-    let across = acceleration(true)?;
+    let inside = acceleration(&|w| !crosses(w[1].index))?;
+    let across = acceleration(&counts)?;
     (inside > 1e-9).then(|| across / inside)
 }
 
@@ -53,6 +64,24 @@ mod tests {
         let aligned = seam(&r.frames).unwrap();
         r.frames.iter_mut().for_each(|f| f.index += 2);
         assert!(seam(&r.frames).unwrap() < 0.7 * aligned);
+    }
+
+    #[test]
+    fn switches_are_measured_where_they_are() {
+        let still = |i: usize, _: f32, p: &mut [glam::Vec3]| p.iter_mut().for_each(|p| p.x += 0.25 * (i * i) as f32);
+        // A jump at one boundary, where the sampler changes or where it does not.
+        let jumping = |i: usize, t: f32, p: &mut [glam::Vec3]| {
+            still(i, t, p);
+            p.iter_mut().for_each(|p| p.x += if i < 20 { 0.0 } else { 1.0 });
+        };
+        let mut r = recording(40, still);
+        assert_eq!(switch_seam(&r.frames), None, "one sampler");
+        r.frames[24..].iter_mut().for_each(|f| f.sampler = crate::frame::Sampler::Single);
+        close(switch_seam(&r.frames).unwrap(), 1.0, 1e-3);
+        let mut r = recording(40, jumping);
+        r.frames[20..].iter_mut().for_each(|f| f.sampler = crate::frame::Sampler::Single);
+        close(switch_seam(&r.frames).unwrap(), 2.0, 1e-3);
+        assert!(seam(&r.frames).unwrap() < 1.2);
     }
 
     #[test]

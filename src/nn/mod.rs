@@ -6,4 +6,4 @@ mod layer;
 mod rope;
 
 pub use layer::{Layer, LayerNorms, Rows, Scratch};
-pub use rope::{Phases, Rope};
+pub use rope::{PERIOD, Phases, Rope};

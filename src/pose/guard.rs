@@ -25,6 +25,9 @@ pub const MAX_TURN_SPEED: f32 = 15.0;
 
 /// A bundle that trips the guard more often than this is defective, trips a minute of motion.
 pub const DEFECTIVE_TRIPS_A_MINUTE: f64 = 1.0;
+/// A bundle is defective as well when more than this part of its motion is held: one that is never plausible trips once and stays
+/// held. A trip holds 12 frames at least, 0.7 % of a minute.
+pub const DEFECTIVE_HELD: f64 = 0.02;
 
 /// Frames of a cross-fade back to decoded poses.
 const FADE: u32 = 8;
@@ -52,6 +55,15 @@ pub struct GuardStats {
     pub root: u64,
     /// Frames shown that were held, or faded back, because of that.
     pub held_frames: u64,
+}
+
+impl GuardStats {
+    /// Whether `frames` frames of motion that were guarded like this come from a defective bundle. One trip is forgiven.
+    pub fn is_defective(&self, frames: u64) -> bool {
+        let minutes = frames as f64 / (60.0 * f64::from(FPS));
+        self.trips as f64 > (DEFECTIVE_TRIPS_A_MINUTE * minutes).max(1.0)
+            || self.held_frames as f64 > DEFECTIVE_HELD * (frames as f64).max(60.0 * f64::from(FPS))
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -157,3 +157,12 @@ fn shown_features_are_those_of_the_frame() {
     let error = frame.global.iter().zip(&held.global).map(|(a, b)| a.position.distance(b.position)).fold(0.0, f32::max);
     assert!(error < 1e-4, "{error} m");
 }
+
+#[test]
+fn one_trip_is_forgiven_a_rate_is_not() {
+    let of = |trips, held_frames| GuardStats { trips, held_frames, ..GuardStats::default() };
+    assert!(!of(0, 0).is_defective(100) && !of(1, 12).is_defective(100));
+    assert!(of(2, 24).is_defective(1700) && !of(2, 24).is_defective(3600));
+    assert!(of(1, 1500).is_defective(1800), "never plausible again");
+    assert!(of(1, 40).is_defective(0) && !of(10, 200).is_defective(18_000));
+}

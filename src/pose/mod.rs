@@ -23,5 +23,7 @@ pub(crate) mod synthetic;
 pub use features::{Decoder, Encoder, feature_count, root_of};
 pub use fit::Fit;
 pub use gaze::gaze_score;
-pub use guard::{DEFECTIVE_TRIPS_A_MINUTE, GuardStats, MAX_JOINT_SPEED, MAX_ROOT_SPEED, MAX_TURN_SPEED};
+pub use guard::{
+    DEFECTIVE_HELD, DEFECTIVE_TRIPS_A_MINUTE, GuardStats, MAX_JOINT_SPEED, MAX_ROOT_SPEED, MAX_TURN_SPEED,
+};
 pub use rig::{Joint, MAX_JOINTS, Rig};

@@ -9,19 +9,26 @@
 //! | memory | resident memory does not grow by more than 1 % over what it was in the second and third tenth of the run |
 //! | allocations | computing a block allocates nothing after the first cycle's tenth (where the caller can count) |
 //! | each metric (soaks of half an hour and more) | over the last ten minutes within 15 % of the first ten; the supporting foot's speed within 15 % of 2 cm/s where it is lower |
-//! | precision | the same noise and inputs a day later move no joint by more than 5 mm from what they do at hour 0 within 20 blocks |
-//! | guard | it trips no more than once a minute ([`crate::pose::DEFECTIVE_TRIPS_A_MINUTE`]) |
+//! | period | the same noise and inputs 2^24 blocks (26 days) later give the same motion, bit for bit, over 40 blocks |
+//! | precision | a day later one block on the same history differs no more (1.5 times, and 5 mm at most) than some tokens later |
+//! | switches | where a governor's steps change the sampler the seam metric is at most 1.2 ([`crate::metrics::switch_seam`]) |
+//! | guard | the motion is not defective ([`crate::pose::GuardStats::is_defective`]) |
 //!
 //! | file | what |
 //! |---|---|
 //! | `script` | what happens when in a cycle |
+//! | `hours` | what the hour changes, and why free runs a day apart say nothing |
+//! | `switches` | motion that changes its sampler again and again |
 //! | `window` | metrics over minutes of frames, in constant memory |
 //! | `judge` | verdicts |
 
+mod hours;
 mod judge;
 mod script;
+mod switches;
 mod window;
 
+pub use hours::Hours;
 pub use judge::{Report, Verdict};
 pub use script::Voices;
 pub use window::Figures;
@@ -115,9 +122,19 @@ impl Soak {
         memory.sample(1.0);
         let seconds = started.elapsed().as_secs_f64();
         let stats = session.stats();
-        let precision = judge::precision(engine, voices, self.sampler)?;
-        let figures = windows.map(|window| window.finish());
-        Ok(judge::report(self, blocks, seconds, &stats, figures, memory, allocations.map(|_| allocated), precision))
+        let hours = Hours::measure(engine, voices, self.sampler)?;
+        let switches = switches::measure(engine, voices)?;
+        let measured = judge::Measured {
+            blocks,
+            seconds,
+            stats,
+            windows: windows.map(|window| window.finish()),
+            memory,
+            allocations: allocations.map(|_| allocated),
+            hours,
+            switches,
+        };
+        Ok(judge::report(self, measured))
     }
 }
 

@@ -29,6 +29,11 @@ impl Voices {
     pub(super) fn agent(&self) -> &[f32] {
         &self.agent
     }
+
+    /// The user's.
+    pub(super) fn user(&self) -> &[f32] {
+        &self.user
+    }
 }
 
 /// Sample rates of the two voices, one after the other.
@@ -65,6 +70,11 @@ impl<'a> Script<'a> {
             agent: Root::default(),
             part: None,
         }
+    }
+
+    /// The same, leaving the sampler alone.
+    pub(super) fn of_one_sampler(self) -> Self {
+        Self { student: false, ..self }
     }
 
     /// Where the user is in the block that was prepared last, as far as the session was told.

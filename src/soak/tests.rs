@@ -20,9 +20,12 @@ fn a_short_soak_measures_everything() {
     assert_eq!((report.blocks, report.windows.len()), (4050, 2));
     assert!(told.len() > 60 && told.windows(2).all(|w| w[0] < w[1]));
     assert!(report.windows.iter().all(|w| w.all().iter().all(|(_, v)| v.is_some_and(f64::is_finite))), "{report:?}");
-    assert!(report.day_difference < 0.005, "{}", report.day_difference);
+    let hours = report.hours_apart;
+    assert!(hours.period_frames_that_differ == 0 && hours.tokens_later > 0.0, "{hours:?}");
+    let passed = |name: &str| report.verdicts.iter().any(|v| v.name == name && v.passed);
+    assert!(passed("period") && passed("precision"), "{hours:?}");
     let names: Vec<_> = report.verdicts.iter().map(|v| v.name.as_str()).collect();
-    assert!(names.ends_with(&["precision", "guard"]), "{names:?}");
+    assert!(names.ends_with(&["period", "precision", "switches", "guard"]), "{names:?}");
     assert!(serde_json::to_string(&report).unwrap().contains("\"verdicts\""));
 }
 
@@ -45,14 +48,28 @@ fn drift_growth_and_allocations_fail() {
         support_foot_speed: Some(support),
         ..Figures::default()
     };
-    let passed = |last: Figures, allocations: u64, day: f64| {
+    let fine = Hours { tokens_later: 1e-5, day_later: 1.4e-5, day_later_most: 1e-4, ..Hours::default() };
+    let with = |last: Figures, allocations: u64, hours: Hours| {
         let windows = [figures(0.5, 0.001), last];
-        let report = judge::report(&soak, 1, 1.0, &stats, windows, judge::Memory::default(), Some(allocations), day);
-        report.passed()
+        let measured = judge::Measured {
+            blocks: 1,
+            seconds: 1.0,
+            stats: stats.clone(),
+            windows,
+            memory: judge::Memory::default(),
+            allocations: Some(allocations),
+            hours,
+            switches: Some(1.2),
+        };
+        judge::report(&soak, measured).passed()
     };
-    assert!(passed(figures(0.56, 0.003), 0, 0.0), "12 %, and 10 % of 2 cm/s");
-    assert!(!passed(figures(0.58, 0.001), 0, 0.0), "16 %");
-    assert!(!passed(figures(0.5, 0.0045), 0, 0.0), "17 % of 2 cm/s");
-    assert!(!passed(figures(0.5, 0.001), 1, 0.0), "an allocation");
-    assert!(!passed(figures(0.5, 0.001), 0, 0.01), "a centimetre after a day");
+    let passed = |last: Figures, allocations: u64| with(last, allocations, fine);
+    assert!(passed(figures(0.56, 0.003), 0), "12 %, and 10 % of 2 cm/s");
+    assert!(!passed(figures(0.58, 0.001), 0), "16 %");
+    assert!(!passed(figures(0.5, 0.0045), 0), "17 % of 2 cm/s");
+    assert!(!passed(figures(0.5, 0.001), 1), "an allocation");
+    let hours = |hours: Hours| with(figures(0.5, 0.001), 0, hours);
+    assert!(!hours(Hours { day_later_most: 0.01, ..fine }), "a centimetre after a day");
+    assert!(!hours(Hours { day_later: 1.6e-5, ..fine }), "a day changes more than a token");
+    assert!(!hours(Hours { period_frames_that_differ: 1, ..fine }), "a bit after a period");
 }

@@ -11,6 +11,7 @@ import torch.nn.functional as F
 
 EPS = 1e-5
 ROTARY_BASE = 10000.0
+ROTARY_PERIOD = 2**24
 
 
 def gelu(x):
@@ -18,9 +19,12 @@ def gelu(x):
 
 
 def rotary(positions, head_dim):
-    """cos, sin [T, head_dim / 2] of integer token positions [T]; the pair of channel i is (i, i + head_dim / 2)."""
+    """cos, sin [T, head_dim / 2] of integer token positions [T]; the pair of channel i is (i, i + head_dim / 2).
+
+    Frequencies are whole turns in ROTARY_PERIOD tokens, so that sessions repeat to the bit (src/nn/rope.rs says why)."""
     half = head_dim // 2
-    freq = ROTARY_BASE ** (-torch.arange(half, dtype=torch.float64) / half)
+    step = 2 * math.pi / ROTARY_PERIOD
+    freq = step * torch.round(ROTARY_BASE ** (-torch.arange(half, dtype=torch.float64) / half) / step)
     angle = positions.double()[:, None] * freq
     return angle.cos().float(), angle.sin().float()
 
