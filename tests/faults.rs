@@ -107,9 +107,7 @@ fn no_writer_leaves_half_a_file() {
     let report = ["report", "--reference", f16, "--candidate", i8, "--quick"];
     for args in [
         &["quantize", f16, file, "--scheme", "i8"][..],
-        &[&eval[..], &["--json", file]].concat(),
         &[&eval[..], &["--md", file]].concat(),
-        &[&report[..], &["--numerics-only", file]].concat(),
         &[&report[..], &["--out", folder]].concat(),
     ] {
         disk_error(&limited(100, args));

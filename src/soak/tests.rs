@@ -54,7 +54,7 @@ fn drift_growth_and_allocations_fail() {
         let measured = judge::Measured {
             blocks: 1,
             seconds: 1.0,
-            stats: stats.clone(),
+            stats,
             windows,
             memory: judge::Memory::default(),
             allocations: Some(allocations),
