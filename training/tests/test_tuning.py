@@ -11,7 +11,7 @@ from safetensors.torch import load_file
 from visavis_train import bundle, checkpoints, export, make_tiny
 from visavis_train.motion import rig
 from visavis_train.nets.flow import Condition, FlowNet
-from visavis_train.train import common, decoder, student, vae
+from visavis_train.train import cache, common, decoder, student, vae
 
 
 def still_body(frames=32):
@@ -127,3 +127,12 @@ def test_maps_from_flow_time_are_f16_even_in_an_f32_bundle(tmp_path):
     bundle.write(str(tmp_path / "b.safetensors"), tensors, {}, narrow=export.NARROW)
     kept = load_file(str(tmp_path / "b.safetensors"))
     assert kept["flow.layers.0.mod.weight"].dtype == torch.float16 and torch.equal(kept["flow.layers.0.fc1.weight"], tensors["flow.layers.0.fc1.weight"])
+
+
+def test_chunks_encoded_together_equal_the_clip_encoded_at_once():
+    net = make_tiny.lively(vae.Vae(7, latent=4, layers=2, width=16, heads=2, mlp=2, window_blocks=3)).eval()
+    blocks = cache.CHUNK * (cache.TOGETHER + 2) + 5  # several at a time, a last lot of fewer, a short chunk at the end
+    x = torch.randn(4 * blocks, 7)
+    with torch.no_grad(), torch.autocast("cpu", torch.bfloat16):
+        whole = net.encoder(x[None])[0][0].float()
+    torch.testing.assert_close(cache.encode(net, x), whole, atol=0.05, rtol=0.05)

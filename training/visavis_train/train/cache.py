@@ -3,7 +3,7 @@
     python -m visavis_train.train.cache --corpus DIR --vae runs/vae.pt --audio runs/audio.pt --out runs/cache
 
 Writes OUT/{train,val}.pt. Latents are encoded at two phases (frame offsets 4 and 6), so that a window need not start where a clip does; with
-`--phases 1` at one of them, in turn over the clips, for half the time. Without `--vae` only the voices are heard, for `--reuse` by a later call.
+`--phases 1` at one of them, in turn over the clips, for half the time. Without `--vae` the cache lacks latents; `--reuse` by a later call adds them.
 """
 import argparse
 import os
@@ -13,10 +13,10 @@ import torch
 from ..nets.audio import AudioEncoder
 from ..nets.vae import Vae
 from .team import Team
-from .data import clips, expand, load_motion
+from .data import Motions, clips, expand, load_motion
 
 PHASES = (4, 6)
-CHUNK, OVERLAP = 48, 24  # the encoder sees 16 blocks a layer; more overlap changes latents by 0.2 % of their deviation
+CHUNK, OVERLAP, TOGETHER = 48, 24, 8  # the encoder sees 16 blocks a layer; more overlap changes latents by 0.2 % of their deviation
 
 
 def load_vae(path):
@@ -35,14 +35,19 @@ def load_audio(path):
 
 @torch.no_grad()
 def encode(vae, x):
-    """Standardised frames [4 K, F] -> encoder means [K, Dz], in overlapping chunks."""
-    blocks, out = len(x) // 4, []
+    """Standardised frames [4 K, F] -> encoder means [K, Dz], in overlapping chunks, several at a time."""
+    blocks, at = len(x) // 4, {}
     for start in range(0, blocks, CHUNK):
-        first = max(0, start - OVERLAP)
-        with torch.autocast("cpu", torch.bfloat16):
-            mu = vae.encoder(x[None, 4 * first:4 * min(blocks, start + CHUNK)])[0][0]
-        out.append(mu[start - first:].float())
-    return torch.cat(out)
+        first, last = max(0, start - OVERLAP), min(blocks, start + CHUNK)
+        at.setdefault((start - first, last - first), []).append(first)
+    out = torch.empty(blocks, vae.encoder.mu.out_features)
+    for (lead, length), firsts in at.items():
+        for part in (firsts[i:i + TOGETHER] for i in range(0, len(firsts), TOGETHER)):
+            with torch.autocast("cpu", torch.bfloat16):
+                mu = vae.encoder(torch.stack([x[4 * f:4 * (f + length)] for f in part]))[0]
+            for f, m in zip(part, mu.float()):
+                out[f + lead:f + length] = m[lead:]
+    return out
 
 
 @torch.no_grad()
@@ -73,7 +78,7 @@ def main():
     parser.add_argument("--phases", type=int, default=2, choices=(1, 2))
     parser.add_argument("--workers", type=int, default=1, help="processes that share the clips")
     parser.add_argument("--waves", action="store_true", help="keep the voices too (i16), for flow training with --end-to-end")
-    parser.add_argument("--reuse", metavar="CACHE", help="take the voices' features of an earlier cache of this corpus (same audio encoder)")
+    parser.add_argument("--reuse", metavar="CACHE", help="take everything but the latents from an earlier cache of this corpus (same audio encoder)")
     parser.add_argument("--threads", type=int, default=1)
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
@@ -83,23 +88,24 @@ def main():
     os.makedirs(args.out, exist_ok=True)
     stats = None
     for split in ("train", "val"):
-        items, heard = [], {}
-        if args.reuse:
-            old = torch.load(os.path.join(args.reuse, split + ".pt"), weights_only=False, mmap=True)["items"]
-            heard = {i["name"]: {k: i[k] for k in ("agent", "voice", "has")} for i in old}
-        paths = clips(args.corpus, split)
+        items, paths, known, poses = [], clips(args.corpus, split), {}, {}
+        if args.reuse and not args.waves:
+            known = {i["name"]: i for i in torch.load(os.path.join(args.reuse, split + ".pt"), weights_only=False, mmap=True)["items"]}
+            poses = dict(zip(map(os.path.basename, paths), Motions(args.corpus, split).items))
         talks = [p for p in paths if os.path.basename(p).startswith("talk")]
         skip = set(talks[args.conversations:] if args.conversations else ())
         for n, path in list(enumerate(p for p in paths if p not in skip))[team.rank::team.size]:
             name = os.path.basename(path)
-            clip, frames, roots, gaze = load_motion(path, voices=args.waves or name not in heard)
+            if name in known:
+                item, frames = dict(known[name]), poses[name]
+            else:
+                clip, frames, roots, gaze = load_motion(path)
+                item = {"name": name, "roots": roots, "user": torch.from_numpy(clip.user_head.copy()), "gaze": gaze, **features(audio, clip, len(frames))}
             if len(frames) < 4 * 12 + 8:
                 continue
-            phases = PHASES if args.phases == 2 else PHASES[n // team.size % 2:][:1]
+            item["phases"] = PHASES if args.phases == 2 else PHASES[n // team.size % 2:][:1]
             x = (expand(frames) - mean) / std if vae else None
-            z = [encode(vae, x[p:p + (len(x) - p) // 4 * 4]) for p in phases] if vae else []
-            item = {"name": name, "z": z, "phases": phases, "roots": roots, "user": torch.from_numpy(clip.user_head.copy()), "gaze": gaze}
-            item |= heard.get(name) or features(audio, clip, len(frames))
+            item["z"] = [encode(vae, x[p:p + (len(x) - p) // 4 * 4]) for p in item["phases"]] if vae else []
             if args.waves:
                 item["waves"] = [torch.from_numpy(v.copy()) if v is not None else None for v in (clip.agent_voice, clip.user_voice)]
             items.append(item)
