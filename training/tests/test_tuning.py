@@ -136,3 +136,14 @@ def test_chunks_encoded_together_equal_the_clip_encoded_at_once():
     with torch.no_grad(), torch.autocast("cpu", torch.bfloat16):
         whole = net.encoder(x[None])[0][0].float()
     torch.testing.assert_close(cache.encode(net, x), whole, atol=0.05, rtol=0.05)
+
+
+def test_a_student_starts_from_the_flow_a_checkpoint_or_an_earlier_change(tmp_path):
+    kept = {}
+    for name, value in (("flow", 1.0), ("student", 1.5), ("other", 7.0)):
+        kept[name] = str(tmp_path / f"{name}.pt")
+        torch.save({"ema": {"w": torch.tensor([value])}}, kept[name])
+    flow = {"w": torch.tensor([3.0])}
+    assert student.beginning(flow) is flow
+    assert student.beginning(flow, kept["other"])["w"].item() == 7.0
+    assert student.beginning(flow, change=(kept["flow"], kept["student"]))["w"].item() == 3.5

@@ -89,6 +89,17 @@ def targets(cond, gaze):
     return Condition(cond.user, cond.agent, cond.voice, wish.expand_as(cond.gaze).clone(), flags)
 
 
+def beginning(flow, init=None, change=None):
+    """Weights to start from: the flow's, those of the checkpoint `init`, or the flow's with the `change` from one checkpoint to another."""
+    ema = lambda path: torch.load(path, weights_only=False)["ema"]
+    if init:
+        return ema(init)
+    if not change:
+        return flow
+    before, after = map(ema, change)
+    return {k: v + after[k] - before[k] for k, v in flow.items()}
+
+
 def calibrated(cond, pairs):
     """The condition with its gaze targets replaced by what the teacher must be asked for to give them: `pairs` are (target, asked)."""
     if not pairs:
@@ -123,6 +134,8 @@ def main():
     parser.add_argument("--lr", type=float, default=4e-4)
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--init", help="student checkpoint to start from; without it the flow")
+    parser.add_argument("--init-change", nargs=2, metavar=("FLOW", "STUDENT"),
+                        help="start from --flow changed as this earlier flow was on the way to its student: much nearer than the flow itself")
     parser.add_argument("--workers", type=int, default=1, help="processes, each with teacher passes of its own")
     parser.add_argument("--resume", action="store_true")
     args = parser.parse_args()
@@ -135,7 +148,7 @@ def main():
     teacher, net = (FlowNet(base["latent"], base["audio"], **base["size"]) for _ in range(2))
     teacher.load_state_dict(base["ema"])
     teacher.eval().requires_grad_(False)
-    net.load_state_dict((torch.load(args.init, weights_only=False) if args.init else base)["ema"])
+    net.load_state_dict(beginning(base["ema"], args.init, args.init_change))
     metric, kept = base["metric"], {k: base[k] for k in ("size", "latent", "audio", "latent_mean", "latent_std", "metric")}
     loop = common.Loop(team, net, args.out, args.minutes, args.lr, warmup=50, resume=args.resume, tau_history=args.tau_history, guidance=args.guidance,
                        gaze_guidance=args.gaze_guidance, **kept)
