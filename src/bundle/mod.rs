@@ -6,6 +6,7 @@
 mod audio;
 mod check;
 mod contents;
+mod drawn;
 mod file;
 mod stored;
 mod tensors;

@@ -1,7 +1,7 @@
 //! Typed, checked access to the tensors of a bundle.
 
 use super::file::invalid;
-use super::{StoredData, StoredWeights};
+use super::{StoredData, StoredWeights, drawn};
 use crate::config::Quantisation;
 use crate::error::{Error, ErrorKind, Result};
 use crate::kernels::{I4_GROUP, Kernels, Matrix, Scheme};
@@ -57,7 +57,7 @@ impl<'a> Tensors<'a> {
     /// a number is not finite.
     pub fn f32(&self, name: &str, shape: &[usize]) -> Result<Vec<f32>> {
         if self.drawn.is_some() {
-            return Ok(drawn(name, shape));
+            return Ok(drawn::floats(name, shape));
         }
         let view = self.view(name, Some(shape))?;
         floats(name, &view)
@@ -69,7 +69,7 @@ impl<'a> Tensors<'a> {
     /// As [`Tensors::f32`].
     pub fn f32_rows(&self, name: &str, columns: usize) -> Result<(usize, Vec<f32>)> {
         if self.drawn.is_some() {
-            return Ok((DRAWN_ROWS, drawn(name, &[DRAWN_ROWS, columns])));
+            return Ok((drawn::ROWS, drawn::floats(name, &[drawn::ROWS, columns])));
         }
         let view = self.view(name, None)?;
         match view.shape() {
@@ -95,12 +95,7 @@ impl<'a> Tensors<'a> {
         let cols = inputs.iter().product::<usize>();
         let shape = [&[outputs], inputs].concat();
         if let Some(scheme) = self.drawn {
-            let values = drawn(&weight, &[outputs, cols]);
-            return match scheme {
-                Scheme::F32 => Ok(StoredWeights { rows: outputs, cols, data: StoredData::F32(values) }),
-                _ if outputs * cols < crate::quant::SMALL => crate::quant::round(&values, outputs, cols, Scheme::F16),
-                _ => crate::quant::round(&values, outputs, cols, scheme),
-            };
+            return Ok(drawn::weights(&weight, outputs, cols, scheme));
         }
         let data = match self.recorded(&weight) {
             None => self.plain(&weight, &shape)?,
@@ -187,29 +182,6 @@ impl<'a> Tensors<'a> {
         self.read.borrow_mut().insert(name.to_owned());
         Ok(view)
     }
-}
-
-/// Rows of a drawn matrix that may have any number.
-const DRAWN_ROWS: usize = 8;
-
-/// Numbers that depend on the name alone: standard deviations are 1, others spread evenly around 0 within one over the root of the row's
-/// length.
-fn drawn(name: &str, shape: &[usize]) -> Vec<f32> {
-    let count = shape.iter().product();
-    if name.ends_with("_std") {
-        return vec![1.0; count];
-    }
-    let scale = 1.0 / (shape.last().copied().unwrap_or(1).max(1) as f32).sqrt();
-    // FNV-1a of the name, then a xorshift.
-    let mut state =
-        name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)) | 1;
-    let mut next = || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 40) as f32 / (1 << 23) as f32 - 1.0
-    };
-    (0..count).map(|_| scale * next()).collect()
 }
 
 fn disagree(name: &str, scheme: Scheme, dtype: Dtype) -> Error {

@@ -3,7 +3,7 @@
 use super::Kernels;
 use super::activations::Activations;
 use super::attend::{Head, KvCache, Span};
-use super::linear::LINE;
+use super::linear::{LINE, by_rows};
 use super::packed::{Buffer, MAX_ROWS};
 use super::quantize_rows::GROUP;
 use crate::error::{Error, ErrorKind, Result};
@@ -62,16 +62,16 @@ pub struct Exec {
 
 /// A pointer that the pieces of one run share; each writes a part of its own.
 #[derive(Clone, Copy)]
-pub(super) struct Shared(pub(super) *mut f32);
+pub(super) struct Shared<T = f32>(pub(super) *mut T);
 // SAFETY: pieces that hold it write disjoint ranges, which each use argues.
-unsafe impl Sync for Shared {}
+unsafe impl<T> Sync for Shared<T> {}
 
-impl Shared {
+impl<T> Shared<T> {
     /// `len` values from `from`.
     ///
     /// # Safety
     /// The range lies in the slice that the pointer came from, and no other reference to it lives meanwhile.
-    pub(super) unsafe fn part<'a>(&self, from: usize, len: usize) -> &'a mut [f32] {
+    pub(super) unsafe fn part<'a>(&self, from: usize, len: usize) -> &'a mut [T] {
         // SAFETY: promised by the caller.
         unsafe { std::slice::from_raw_parts_mut(self.0.add(from), len) }
     }
@@ -146,10 +146,13 @@ impl Exec {
         y: &mut [f32],
     ) {
         assert!(x.len() == rows * dim && y.len() == rows * dim, "norm: x and y are rows x dim");
-        for (r, (x, y)) in x.chunks_exact(dim).zip(y.chunks_exact_mut(dim)).enumerate() {
+        let (kernels, y) = (&self.kernels, Shared(y.as_mut_ptr()));
+        by_rows(&mut self.pool, rows, x.len(), &|r| {
+            // SAFETY: row r of y, in one piece.
+            let y = unsafe { y.part(r * dim, dim) };
             // SAFETY: a `Kernels` exists only for a level that this CPU has.
-            unsafe { (self.kernels.norm.run)(x, shift.part(r, 0, dim), scale.part(r, 0, dim), y) }
-        }
+            unsafe { (kernels.norm.run)(&x[r * dim..][..dim], shift.part(r, 0, dim), scale.part(r, 0, dim), y) }
+        });
     }
 
     /// Rotary positions, half-split, on the first `heads * head_dim` values of each of `rows` rows of `row_stride` values;
@@ -172,11 +175,14 @@ impl Exec {
         );
         assert!(x.len() == rows * row_stride, "rope: x is rows x row_stride");
         assert!(cos.len() == rows * half && sin.len() == rows * half, "rope: cos and sin are rows x head_dim/2");
-        for (r, x) in x.chunks_exact_mut(row_stride).enumerate() {
+        let (kernels, values, x) = (&self.kernels, x.len(), Shared(x.as_mut_ptr()));
+        by_rows(&mut self.pool, rows, values, &|r| {
             let at = r * half..(r + 1) * half;
+            // SAFETY: whole heads within row r of x, in one piece.
+            let x = unsafe { x.part(r * row_stride, heads * head_dim) };
             // SAFETY: a `Kernels` exists only for a level that this CPU has.
-            unsafe { (self.kernels.rope.run)(&mut x[..heads * head_dim], &cos[at.clone()], &sin[at]) }
-        }
+            unsafe { (kernels.rope.run)(x, &cos[at.clone()], &sin[at]) }
+        });
     }
 
     /// Attention: row r of `q` (`row_stride` values, of which the first `cache.dim()` are the heads' queries) over `spans[r]`,
@@ -207,7 +213,7 @@ impl Exec {
         let y = Shared(y.as_mut_ptr());
         // Neighbouring rows often share a ring, so one piece is one head of up to 4 rows: its keys stay in the cache.
         let groups = rows.div_ceil(4);
-        self.pool.run(groups * heads, &|piece| {
+        self.pool.run(groups * heads, &|piece, _| {
             let (head, group) = (piece % heads, piece / heads);
             for r in group * 4..rows.min(group * 4 + 4) {
                 let q = &q[r * row_stride + head * head_dim..][..head_dim];
@@ -218,9 +224,11 @@ impl Exec {
                 unsafe {
                     match &cache.store {
                         super::attend::Store::F16(k, v) => {
+                            let (k, v) = (k.of(), v.of());
                             (kernels.attend.run.f16)(&ring(cache, k, v, span, offset), q, y);
                         }
                         super::attend::Store::F32(k, v) => {
+                            let (k, v) = (k.of(), v.of());
                             (kernels.attend.run.f32)(&ring(cache, k, v, span, offset), q, y);
                         }
                     }

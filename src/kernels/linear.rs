@@ -6,6 +6,7 @@ use super::matrix::{Body, Matrix};
 use super::packed::{Buffer, MAX_PANELS, MAX_ROWS, NR, TILE_COLS, Tile};
 use super::quantize_rows::GROUP;
 use super::{Kernels, matmul_f32_f32, matmul_i8dx_i4g, matmul_i8dx_i8cx};
+use crate::par::Pool;
 
 /// What [`Exec::linear`] does with xW' + b.
 #[derive(Debug, Clone, Copy)]
@@ -58,12 +59,16 @@ impl Exec {
             unsafe { (kernels.epilogue.run)(sums, &w.bias[from..], finish, y) }
         };
         let span = |tile: usize| (tile * MAX_PANELS, MAX_PANELS.min(panels - tile * MAX_PANELS));
+        // Bytes from a tile to the one after it, which prefetching goes on with.
+        let step = |tile: usize, next: usize, panel: usize| {
+            if next < tiles { (next as isize - tile as isize) * (MAX_PANELS * panel) as isize } else { 0 }
+        };
 
         match &w.body {
             Body::F32(buffer, geo, variant) => {
                 let (x, stride) = spread(x, rows, w.cols, geo.padded(), padded);
                 let weights = buffer.of::<f32>();
-                pool.run(tiles, &|t| {
+                pool.run(tiles, &|t, _| {
                     let (first, panels) = span(t);
                     let mut tile: Tile<f32> = [[0.0; TILE_COLS]; MAX_ROWS];
                     let job = matmul_f32_f32::Job { x, stride, rows, weights, geo: *geo, first, panels };
@@ -75,7 +80,7 @@ impl Exec {
             Body::F16(buffer, geo, variant) => {
                 let (x, stride) = spread(x, rows, w.cols, geo.padded(), padded);
                 let weights = buffer.of::<half::f16>();
-                pool.run(tiles, &|t| {
+                pool.run(tiles, &|t, _| {
                     let (first, panels) = span(t);
                     let mut tile: Tile<f32> = [[0.0; TILE_COLS]; MAX_ROWS];
                     let job = matmul_f32_f32::Job { x, stride, rows, weights, geo: *geo, first, panels };
@@ -88,16 +93,18 @@ impl Exec {
                 let stride = geo.padded + LINE;
                 let n = rows * stride;
                 let (q, sums) = (&mut q.of_mut::<i8>()[..n], &mut sums[..rows * geo.padded / GROUP]);
-                let x_scale = quantize(kernels, x, w.cols, geo.padded, q, sums);
+                let x_scale = quantize(kernels, pool, x, w.cols, geo.padded, q, sums);
                 let wide = &mut wide.of_mut::<i16>()[..if variant.run.wide { n } else { 0 }];
                 for (wide, q) in wide.iter_mut().zip(&*q) {
                     *wide = i16::from(*q);
                 }
                 let (q, sums, wide, weights) = (&*q, &*sums, &*wide, buffer.of::<u8>());
-                pool.run(tiles, &|t| {
+                pool.run(tiles, &|t, next| {
                     let (first, panels) = span(t);
                     let mut tile: Tile<i32> = [[0; TILE_COLS]; MAX_ROWS];
-                    let job = matmul_i8dx_i8cx::Job { q, wide, sums, stride, rows, weights, geo: *geo, first, panels };
+                    let next = step(t, next, geo.panel);
+                    let geo = *geo;
+                    let job = matmul_i8dx_i8cx::Job { q, wide, sums, stride, rows, weights, geo, first, panels, next };
                     // SAFETY: a matrix holds a variant that this CPU can run.
                     unsafe { (variant.run.run)(&job, &mut tile) };
                     (0..rows).for_each(|r| finish(t, r, Sums::I32(&tile[r], x_scale[r], &scale[t * TILE_COLS..])));
@@ -106,13 +113,15 @@ impl Exec {
             Body::I4(buffer, geo, variant) => {
                 let stride = geo.padded() + LINE;
                 let (q, sums) = (&mut q.of_mut::<i8>()[..rows * stride], &mut sums[..rows * geo.groups]);
-                let x_scale = quantize(kernels, x, w.cols, geo.padded(), q, sums);
+                let x_scale = quantize(kernels, pool, x, w.cols, geo.padded(), q, sums);
                 let (q, sums) = (&*q, &*sums);
                 let (weights, scales) = (buffer.of::<u8>(), buffer.of::<half::f16>());
-                pool.run(tiles, &|t| {
+                pool.run(tiles, &|t, next| {
                     let (first, panels) = span(t);
                     let mut tile: Tile<f32> = [[0.0; TILE_COLS]; MAX_ROWS];
-                    let job = matmul_i8dx_i4g::Job { q, sums, stride, rows, weights, scales, geo: *geo, first, panels };
+                    let next = step(t, next, geo.panel);
+                    let geo = *geo;
+                    let job = matmul_i8dx_i4g::Job { q, sums, stride, rows, weights, scales, geo, first, panels, next };
                     // SAFETY: a matrix holds a variant that this CPU can run.
                     unsafe { (variant.run)(&job, &mut tile) };
                     (0..rows).for_each(|r| finish(t, r, Sums::Scaled(&tile[r], x_scale[r])));
@@ -143,6 +152,7 @@ fn spread<'a>(x: &'a [f32], rows: usize, cols: usize, padded: usize, scratch: &'
 /// Quantises each row of `x` into rows of `q` that are `padded` and a line apart; returns the rows' scales.
 fn quantize(
     kernels: &Kernels,
+    pool: &mut Pool,
     x: &[f32],
     cols: usize,
     padded: usize,
@@ -150,10 +160,25 @@ fn quantize(
     sums: &mut [i32],
 ) -> [f32; MAX_ROWS] {
     let mut scales = [0.0; MAX_ROWS];
-    let rows = x.chunks_exact(cols).zip(q.chunks_exact_mut(padded + LINE)).zip(sums.chunks_exact_mut(padded / GROUP));
-    for (scale, ((x, q), sums)) in scales.iter_mut().zip(rows) {
+    let (stride, groups) = (padded + LINE, padded / GROUP);
+    let (q, sums, scale) = (Shared(q.as_mut_ptr()), Shared(sums.as_mut_ptr()), Shared(scales.as_mut_ptr()));
+    by_rows(pool, x.len() / cols, x.len(), &|r| {
+        // SAFETY: q has a padded row a stride, sums its groups and scales an element for each row of x; a row is one piece.
+        let (q, sums, scale) = unsafe { (q.part(r * stride, padded), sums.part(r * groups, groups), scale.part(r, 1)) };
         // SAFETY: a `Kernels` exists only for a level that this CPU has.
-        *scale = unsafe { (kernels.quantize.run)(x, &mut q[..padded], sums) };
-    }
+        scale[0] = unsafe { (kernels.quantize.run)(&x[r * cols..][..cols], q, sums) };
+    });
     scales
+}
+
+/// Values of a few rows from which on sharing them out pays for telling the other thread.
+const WORTH_SHARING: usize = 2048;
+
+/// Calls `work` for each of `rows` rows, on both threads where `values`, the number of values in all of them, makes it worth it.
+pub(super) fn by_rows(pool: &mut Pool, rows: usize, values: usize, work: &(dyn Fn(usize) + Sync)) {
+    if values < WORTH_SHARING {
+        (0..rows).for_each(work);
+    } else {
+        pool.run(rows, &|row, _| work(row));
+    }
 }

@@ -137,6 +137,7 @@ impl FloatGeometry {
     }
 
     /// Element that holds weight (`row`, `col`).
+    #[cfg(test)]
     pub(crate) fn at(&self, row: usize, col: usize) -> usize {
         let (s, k) = (col / self.seg, col % self.seg);
         (row / NR) * self.panel + s * self.seg_stride + k * NR + row % NR

@@ -18,7 +18,8 @@ const MAX_PIECES: usize = u16::MAX as usize;
 /// Spins before the caller lets another thread have its core; about a millisecond, reached only where the helper lost its own.
 const SPINS: u32 = 1 << 15;
 
-type Work<'a> = dyn Fn(usize) + Sync + 'a;
+/// A piece, and the one that this thread takes after it if there is one left.
+type Work<'a> = dyn Fn(usize, usize) + Sync + 'a;
 
 /// Keeps what the threads write out of each other's cache lines.
 #[repr(align(128))]
@@ -76,7 +77,7 @@ impl Shared {
                 let work = unsafe { (*self.work.get()).map(|w| &*w) };
                 let outcome = catch_unwind(AssertUnwindSafe(|| {
                     if let Some(work) = work {
-                        work(piece);
+                        work(piece, piece.wrapping_sub(1));
                     }
                 }));
                 if let Err(payload) = outcome {
@@ -156,14 +157,16 @@ impl Pool {
         self.shared.awake.0.store(false, Ordering::Release);
     }
 
-    /// Calls `work(i)` once for each i in `0..pieces`, here and on the helper if it is awake; returns when all have returned.
+    /// Calls `work(i, next)` once for each i in `0..pieces`, here and on the helper if it is awake; returns when all have returned.
+    /// `next` is the piece that the same thread will take next, unless the other one is faster or it is not below `pieces`: a hint for
+    /// prefetching.
     ///
     /// # Panics
     /// With the panic of a piece, after all pieces that were begun have ended. With more than 65,535 pieces.
-    pub fn run(&mut self, pieces: usize, work: &(dyn Fn(usize) + Sync)) {
+    pub fn run(&mut self, pieces: usize, work: &(dyn Fn(usize, usize) + Sync)) {
         let awake = self.helper.is_some() && self.shared.awake.0.load(Ordering::Relaxed);
         if pieces < 2 || !awake {
-            (0..pieces).for_each(work);
+            (0..pieces).for_each(|piece| work(piece, piece + 1));
             return;
         }
         assert!(pieces <= MAX_PIECES, "too many pieces");
@@ -179,7 +182,7 @@ impl Pool {
         let outcome = catch_unwind(AssertUnwindSafe(|| {
             while let Some(piece) = shared.take(true) {
                 mine += 1;
-                work(piece);
+                work(piece, piece + 1);
             }
         }));
         while shared.take(true).is_some() {
@@ -237,7 +240,8 @@ mod tests {
                 }
                 for pieces in (0..200).chain([1000]) {
                     let counts: Vec<AtomicUsize> = (0..pieces).map(|_| AtomicUsize::new(0)).collect();
-                    pool.run(pieces, &|i| {
+                    pool.run(pieces, &|i, next| {
+                        assert!(next == i + 1 || next == i.wrapping_sub(1));
                         counts[i].fetch_add(1, Ordering::Relaxed);
                     });
                     assert!(counts.iter().all(|c| c.load(Ordering::Relaxed) == 1));
@@ -254,7 +258,7 @@ mod tests {
         let caller = thread::current().id();
         let helped = AtomicBool::new(false);
         // Ends when the helper has taken a piece; the caller's pieces wait for that.
-        pool.run(2, &|_| {
+        pool.run(2, &|_, _| {
             if thread::current().id() == caller {
                 while !helped.load(Ordering::Acquire) {
                     thread::yield_now();
@@ -284,13 +288,13 @@ mod tests {
         pool.begin();
         for bad in 0..20 {
             let outcome = catch_unwind(AssertUnwindSafe(|| {
-                pool.run(20, &|i| assert!(i != bad, "piece {i}"));
+                pool.run(20, &|i, _| assert!(i != bad, "piece {i}"));
             }));
             let message = *outcome.unwrap_err().downcast::<String>().unwrap();
             assert_eq!(message, format!("piece {bad}"));
         }
         let sum = AtomicUsize::new(0);
-        pool.run(20, &|i| {
+        pool.run(20, &|i, _| {
             sum.fetch_add(i, Ordering::Relaxed);
         });
         assert_eq!(sum.into_inner(), 190);

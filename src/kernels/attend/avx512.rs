@@ -5,6 +5,8 @@ use super::{CHUNK, Head, scalar};
 
 /// Tokens whose scores are computed side by side.
 const TOKENS: usize = 4;
+/// Tokens ahead of the one in work whose keys are asked for.
+const AHEAD: usize = 8;
 /// Registers of results that stay in place while values go by.
 const BLOCK: usize = 8;
 
@@ -38,6 +40,10 @@ fn body<T>(head: &Head<'_, T>, q: &[f32], out: &mut [f32], load: impl Fn(*const 
         let mut p = [0.0f32; CHUNK];
         let mut t = 0;
         while t + TOKENS <= tokens {
+            for i in t..t + TOKENS {
+                fetch(head, head.k, start + i + AHEAD, q.len());
+                fetch(head, head.v, start + i, q.len());
+            }
             scores::<TOKENS, T>(head, q, start + t, &mut p[t..], load);
             t += TOKENS;
         }
@@ -66,6 +72,18 @@ fn body<T>(head: &Head<'_, T>, q: &[f32], out: &mut [f32], load: impl Fn(*const 
     if head.len > 0 {
         let inverse = 1.0 / total;
         out.iter_mut().for_each(|o| *o *= inverse);
+    }
+}
+
+/// Asks for this head's values of token `t` of `rows`, if there is one.
+#[inline(always)]
+fn fetch<T>(head: &Head<'_, T>, rows: &[T], t: usize, n: usize) {
+    if t < head.len {
+        let row = rows[head.at(t)..].as_ptr().cast::<i8>();
+        for line in (0..n * size_of::<T>()).step_by(64) {
+            // SAFETY: a prefetch may point anywhere.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(row.wrapping_add(line)) };
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! The key and value cache: rings of tokens, allocated once.
 
+use crate::kernels::packed::{Buffer, Plain};
 use half::f16;
 use half::slice::HalfFloatSliceExt;
 
@@ -35,8 +36,8 @@ pub struct KvCache {
 
 /// Keys, then values.
 pub(crate) enum Store {
-    F16(Vec<f16>, Vec<f16>),
-    F32(Vec<f32>, Vec<f32>),
+    F16(Buffer, Buffer),
+    F32(Buffer, Buffer),
 }
 
 impl KvCache {
@@ -48,8 +49,8 @@ impl KvCache {
         assert!(capacity > 0 && dim > 0, "a ring holds at least one token of at least one value");
         let n = rings * capacity * dim;
         let store = match dtype {
-            KvDtype::F16 => Store::F16(vec![f16::ZERO; n], vec![f16::ZERO; n]),
-            KvDtype::F32 => Store::F32(vec![0.0; n], vec![0.0; n]),
+            KvDtype::F16 => Store::F16(Buffer::new(2 * n), Buffer::new(2 * n)),
+            KvDtype::F32 => Store::F32(Buffer::new(4 * n), Buffer::new(4 * n)),
         };
         Self { rings, capacity, dim, store }
     }
@@ -64,12 +65,12 @@ impl KvCache {
         let dim = self.dim;
         match &mut self.store {
             Store::F16(keys, values) => {
-                keys[at..at + dim].convert_from_f32_slice(k);
-                values[at..at + dim].convert_from_f32_slice(v);
+                keys.of_mut::<f16>()[at..at + dim].convert_from_f32_slice(k);
+                values.of_mut::<f16>()[at..at + dim].convert_from_f32_slice(v);
             }
             Store::F32(keys, values) => {
-                keys[at..at + dim].copy_from_slice(k);
-                values[at..at + dim].copy_from_slice(v);
+                keys.of_mut()[at..at + dim].copy_from_slice(k);
+                values.of_mut()[at..at + dim].copy_from_slice(v);
             }
         }
     }
@@ -80,24 +81,20 @@ impl KvCache {
     /// When a ring does not exist.
     pub fn copy_token(&mut self, from_ring: usize, to_ring: usize, position: u64) {
         let (from, to) = (self.at(from_ring, position), self.at(to_ring, position));
-        let range = from..from + self.dim;
-        match &mut self.store {
-            Store::F16(keys, values) => {
-                keys.copy_within(range.clone(), to);
-                values.copy_within(range, to);
-            }
-            Store::F32(keys, values) => {
-                keys.copy_within(range.clone(), to);
-                values.copy_within(range, to);
-            }
+        let dim = self.dim;
+        fn copy<T: Plain>(store: &mut Buffer, from: usize, to: usize, dim: usize) {
+            store.of_mut::<T>().copy_within(from..from + dim, to);
         }
+        match &mut self.store {
+            Store::F16(keys, values) => [keys, values].map(|store| copy::<f16>(store, from, to, dim)),
+            Store::F32(keys, values) => [keys, values].map(|store| copy::<f32>(store, from, to, dim)),
+        };
     }
 
     /// Bytes in memory.
     pub fn bytes(&self) -> usize {
         match &self.store {
-            Store::F16(k, v) => 2 * (k.len() + v.len()),
-            Store::F32(k, v) => 4 * (k.len() + v.len()),
+            Store::F16(k, v) | Store::F32(k, v) => k.bytes() + v.bytes(),
         }
     }
 

@@ -4,7 +4,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{GROUP, GROUP_BYTES, Job, NR, Tile};
+use super::{GROUP, Geometry, Job, NR, Tile};
 
 /// Bytes ahead of each panel that are asked for.
 const AHEAD: usize = 1024;
@@ -72,7 +72,7 @@ fn rows<const R: usize>(
             for j in 0..GROUP / 8 {
                 // SAFETY: half h of line j of group g of panel c, within the slice; a prefetch may point anywhere.
                 let w = unsafe {
-                    let line = weights.add(c * panel + g * GROUP_BYTES + j * 64 + h * 32);
+                    let line = weights.add(c * panel + Geometry::nibbles(g) + j * 64 + h * 32);
                     _mm_prefetch::<_MM_HINT_T0>(line.cast::<i8>().wrapping_add(AHEAD));
                     _mm256_loadu_si256(line.cast())
                 };
@@ -86,9 +86,9 @@ fn rows<const R: usize>(
                     *acc = dot(dot(*acc, a, _mm256_set1_epi32(x)), b, _mm256_set1_epi32(y));
                 }
             }
-            // SAFETY: half of the 16 scales of group g behind the nibbles of panel c.
+            // SAFETY: half of the 16 scales of group g of panel c.
             let scale = _mm256_cvtph_ps(unsafe {
-                _mm_loadu_si128(scales.add((c * panel + groups * GROUP_BYTES) / 2 + g * NR + h * 8).cast())
+                _mm_loadu_si128(scales.add(c * panel / 2 + Geometry::scales(g) + h * 8).cast())
             });
             for (r, row) in tile.iter_mut().enumerate() {
                 let sum = _mm256_cvtepi32_ps(_mm256_add_epi32(widen(acc[r]), _mm256_set1_epi32(offset[r])));

@@ -1,54 +1,73 @@
 //! Nibbles are unsigned, as `vpdpbusd` wants them; accumulators of a group start at -8 sum q, which takes off their offset.
-//!
-//! Float sums stay in the tile, which leaves the registers to a group's accumulators.
+//! Float sums stay in registers: four panels of up to 4 rows, two of up to 6.
 
 use std::arch::x86_64::*;
 
-use super::{GROUP, GROUP_BYTES, Job, NR, Tile};
+use super::{GROUP, Geometry, Job, NR, Tile};
 
-/// Bytes ahead of each panel that are asked for.
+/// Bytes ahead of each panel that are asked for; at its end, those of the panel that this thread reads next.
 const AHEAD: usize = 1024;
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
 pub(super) fn run(job: &Job<'_>, tile: &mut Tile<f32>) {
     job.check();
-    // Even portions of at most 5 rows: with more, the compiler runs out of registers.
-    let portion = job.rows.div_ceil(job.rows.div_ceil(5));
+    // Even portions of at most 6 rows.
+    let portion = job.rows.div_ceil(job.rows.div_ceil(6));
     for r in (0..job.rows).step_by(portion) {
         match portion.min(job.rows - r) {
             1 => rows::<1>(job, r, tile),
             2 => rows::<2>(job, r, tile),
             3 => rows::<3>(job, r, tile),
             4 => rows::<4>(job, r, tile),
-            _ => rows::<5>(job, r, tile),
+            5 => rows::<5>(job, r, tile),
+            _ => rows::<6>(job, r, tile),
         }
     }
 }
 
-/// Rows `row .. row + R` of the job.
+/// Rows `row .. row + R` of the job, as many panels at once as there are registers for.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
 fn rows<const R: usize>(job: &Job<'_>, row: usize, tile: &mut Tile<f32>) {
+    let mut p = 0;
+    while R <= 4 && p + 4 <= job.panels {
+        block::<R, 4>(job, row, p, tile);
+        p += 4;
+    }
+    while p + 2 <= job.panels {
+        block::<R, 2>(job, row, p, tile);
+        p += 2;
+    }
+    if p < job.panels {
+        block::<R, 1>(job, row, p, tile);
+    }
+}
+
+/// Rows from `row`, panels from `p` of the job.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
+fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<f32>) {
     let (groups, panel, stride) = (job.geo.groups, job.geo.panel, job.stride);
-    let start = job.first * panel;
-    let weights = job.weights[start..][..job.panels * panel].as_ptr();
-    let scales = job.scales[start / 2..][..job.panels * panel / 2].as_ptr();
+    let start = (job.first + p) * panel;
+    let weights = job.weights[start..][..P * panel].as_ptr();
+    let scales = job.scales[start / 2..][..P * panel / 2].as_ptr();
     let q = job.q[row * stride..][..R * stride].as_ptr();
     let sums = &job.sums[row * groups..][..R * groups];
     let low = _mm512_set1_epi8(15);
-    let tile = &mut tile[row..row + R];
-    for row in &mut *tile {
-        row[..job.panels * NR].fill(0.0);
-    }
+    // The next panels of this tile, or those of the next tile.
+    let next = if p + P < job.panels { (P * panel) as isize } else { job.next - (p * panel) as isize } - panel as isize;
+    let mut total = [[_mm512_setzero_ps(); P]; R];
     for g in 0..groups {
+        let at = Geometry::nibbles(g);
+        let ahead = if at + AHEAD < panel { at as isize } else { next + at as isize };
+        // May point anywhere.
+        let far = weights.wrapping_offset(ahead + AHEAD as isize);
         let start: [i32; R] = std::array::from_fn(|r| -8 * sums[r * groups + g]);
-        for c in 0..job.panels {
+        for c in 0..P {
             let mut acc: [__m512i; R] = start.map(|s| _mm512_set1_epi32(s));
             for j in 0..GROUP / 8 {
                 // SAFETY: line j of group g of panel c, within the slice; a prefetch may point anywhere.
                 let w = unsafe {
-                    let line = weights.add(c * panel + g * GROUP_BYTES + j * 64);
-                    _mm_prefetch::<_MM_HINT_T0>(line.cast::<i8>().wrapping_add(AHEAD));
-                    _mm512_loadu_si512(line.cast())
+                    _mm_prefetch::<_MM_HINT_T0>(far.wrapping_add(c * panel + j * 64).cast());
+                    _mm512_loadu_si512(weights.add(c * panel + at + j * 64).cast())
                 };
                 let (a, b) = (_mm512_and_si512(w, low), _mm512_and_si512(_mm512_srli_epi16::<4>(w), low));
                 for (r, acc) in acc.iter_mut().enumerate() {
@@ -61,18 +80,21 @@ fn rows<const R: usize>(job: &Job<'_>, row: usize, tile: &mut Tile<f32>) {
                     *acc = _mm512_dpbusd_epi32(*acc, b, _mm512_set1_epi32(y));
                 }
             }
-            // SAFETY: 16 scales of group g behind the nibbles of panel c.
+            // SAFETY: the 16 scales of group g of panel c; a prefetch may point anywhere.
             let scale = _mm512_cvtph_ps(unsafe {
-                _mm256_loadu_si256(scales.add((c * panel + groups * GROUP_BYTES) / 2 + g * NR).cast())
+                _mm_prefetch::<_MM_HINT_T0>(far.wrapping_add(c * panel + 256).cast());
+                _mm256_loadu_si256(scales.add(c * panel / 2 + Geometry::scales(g)).cast())
             });
-            for (acc, row) in acc.into_iter().zip(&mut *tile) {
-                let total = row[c * NR..][..NR].as_mut_ptr();
-                // SAFETY: 16 values at `total`.
-                unsafe {
-                    let sum = _mm512_fmadd_ps(scale, _mm512_cvtepi32_ps(acc), _mm512_loadu_ps(total));
-                    _mm512_storeu_ps(total, sum);
-                }
+            for (total, acc) in total.iter_mut().zip(acc) {
+                total[c] = _mm512_fmadd_ps(scale, _mm512_cvtepi32_ps(acc), total[c]);
             }
+        }
+    }
+    for (r, total) in total.iter().enumerate() {
+        for (c, total) in total.iter().enumerate() {
+            let out = &mut tile[row + r][(p + c) * NR..][..NR];
+            // SAFETY: 16 values at `out`.
+            unsafe { _mm512_storeu_ps(out.as_mut_ptr(), *total) };
         }
     }
 }

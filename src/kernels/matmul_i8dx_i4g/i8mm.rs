@@ -3,7 +3,7 @@
 
 use std::arch::aarch64::*;
 
-use super::{GROUP, GROUP_BYTES, Job, NR, Tile};
+use super::{GROUP, Geometry, Job, NR, Tile};
 use crate::kernels::matmul_i8dx_i8cx::i8mm::smmla;
 
 #[target_feature(enable = "neon,i8mm")]
@@ -25,7 +25,7 @@ fn block<const PAIRS: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Til
     let (groups, panel) = (job.geo.groups, job.geo.panel);
     let start = (job.first + p) * panel;
     let weights = job.weights[start..][..panel].as_ptr();
-    let scales = job.scales[(start + groups * GROUP_BYTES) / 2..][..groups * NR].as_ptr().cast::<u16>();
+    let scales = job.scales[start / 2..][..panel / 2].as_ptr().cast::<u16>();
     let last = job.rows - 1;
     let index: [[usize; 2]; PAIRS] = std::array::from_fn(|i| [0, 1].map(|j| last.min(row + 2 * i + j)));
     let rows = index.map(|pair| pair.map(|r| job.q[r * job.stride..][..job.geo.padded()].as_ptr()));
@@ -44,7 +44,7 @@ fn block<const PAIRS: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Til
             let mut acc = [[vdupq_n_s32(0); 2]; PAIRS];
             for j in 0..GROUP / 8 {
                 // SAFETY: 16 bytes of line j of group g of the panel: outputs 4 quad .. 4 quad + 4.
-                let w = unsafe { vld1q_u8(weights.add(g * GROUP_BYTES + j * 64 + quad * 16)) };
+                let w = unsafe { vld1q_u8(weights.add(Geometry::nibbles(g) + j * 64 + quad * 16)) };
                 let low = vreinterpretq_u32_u8(vandq_u8(w, vdupq_n_u8(15)));
                 let high = vreinterpretq_u32_u8(vshrq_n_u8::<4>(w));
                 let w = [vzip1q_u32(low, high), vzip2q_u32(low, high)].map(|w| vreinterpretq_s8_u32(w));
@@ -53,7 +53,7 @@ fn block<const PAIRS: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Til
                 }
             }
             // SAFETY: 4 of the 16 scales of group g.
-            let scale = unsafe { vld1_u16(scales.add(g * NR + quad * 4)) };
+            let scale = unsafe { vld1_u16(scales.add(Geometry::scales(g) + quad * 4)) };
             let scale = vcvt_f32_f16(vreinterpret_f16_u16(scale));
             for i in 0..PAIRS {
                 let [a, b] = acc[i];

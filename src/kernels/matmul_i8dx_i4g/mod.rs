@@ -3,8 +3,9 @@
 //! Nibbles n in 0..=15 stand for -8..=7; a group's scale is an f16. The inner sums are exact; the outer sum visits the groups in
 //! ascending order, one fused multiply-add each, from zero. The row's scale is applied by the [`epilogue`](super::epilogue).
 //!
-//! Packed panel: for each group four lines of 64 bytes, line j holding for each of 16 lanes 4 bytes, byte i with column 8j + i in the
-//! low nibble and 8j + 4 + i in the high one; after all groups their scales, 16 f16 a group.
+//! Packed panel: for each pair of groups nine lines of 64 bytes, read one after the other: four a group, line j holding for each of 16
+//! lanes 4 bytes, byte i with column 8j + i in the low nibble and 8j + 4 + i in the high one, and one with the 16 f16 scales of
+//! both groups.
 
 use half::f16;
 
@@ -37,10 +38,39 @@ pub(crate) struct Geometry {
 /// Bytes of the nibbles of one group of one panel.
 pub(crate) const GROUP_BYTES: usize = GROUP * NR / 2;
 
+/// Bytes of a pair of groups with their scales.
+const PAIR_BYTES: usize = 2 * GROUP_BYTES + 4 * NR;
+
 impl Geometry {
     pub(crate) fn new(cols: usize) -> Self {
         let groups = cols.div_ceil(GROUP);
-        Self { groups, panel: ((groups * (GROUP_BYTES + 2 * NR)).div_ceil(64) | 1) * 64 }
+        Self { groups, panel: ((groups.div_ceil(2) * PAIR_BYTES / 64) | 1) * 64 }
+    }
+
+    /// First byte of the nibbles of group `group` within a panel.
+    #[inline(always)]
+    pub(crate) fn nibbles(group: usize) -> usize {
+        group / 2 * PAIR_BYTES + group % 2 * GROUP_BYTES
+    }
+
+    /// First f16 element of the scales of group `group` within a panel.
+    #[inline(always)]
+    pub(crate) fn scales(group: usize) -> usize {
+        (group / 2 * PAIR_BYTES + 2 * GROUP_BYTES) / 2 + group % 2 * NR
+    }
+
+    /// Writes 16 rows (fewer: the last panel) of `cols` nibbles, two a byte, into the bytes of one panel, which are zero.
+    pub(crate) fn pack(q: &[u8], cols: usize, panel: &mut [u8]) {
+        for (lane, row) in q.chunks_exact(cols.div_ceil(2)).enumerate() {
+            for (i, from) in row.chunks(4).enumerate() {
+                let mut bytes = [0; 4];
+                bytes[..from.len()].copy_from_slice(from);
+                // Nothing past the last column.
+                let eight = u32::from_le_bytes(bytes) & u32::MAX >> (32 - 4 * (cols - 8 * i).min(8));
+                let line = panel[Self::nibbles(i / 4) + i % 4 * 64..][..64].as_chunks_mut::<4>().0;
+                line[lane] = (spread(eight & 0xffff) | spread(eight >> 16) << 4).to_le_bytes();
+            }
+        }
     }
 
     pub(crate) fn padded(&self) -> usize {
@@ -48,15 +78,22 @@ impl Geometry {
     }
 
     /// Byte that holds weight (`row`, `col`), and whether in its high nibble.
+    #[cfg(test)]
     pub(crate) fn at(&self, row: usize, col: usize) -> (usize, bool) {
-        let byte = (row / NR) * self.panel + col / GROUP * GROUP_BYTES + col % GROUP / 8 * 64 + row % NR * 4 + col % 4;
+        let byte = (row / NR) * self.panel + Self::nibbles(col / GROUP) + col % GROUP / 8 * 64 + row % NR * 4 + col % 4;
         (byte, col % 8 >= 4)
     }
 
     /// f16 element that holds the scale of group `group` of `row`.
     pub(crate) fn scale_at(&self, row: usize, group: usize) -> usize {
-        ((row / NR) * self.panel + self.groups * GROUP_BYTES) / 2 + group * NR + row % NR
+        (row / NR) * self.panel / 2 + Self::scales(group) + row % NR
     }
+}
+
+/// Four nibbles, one a byte.
+fn spread(nibbles: u32) -> u32 {
+    let bytes = (nibbles | nibbles << 8) & 0x00ff_00ff;
+    (bytes | bytes << 4) & 0x0f0f_0f0f
 }
 
 /// Operands: as of the int8 product, with int4 panels; `scales` is the same memory as `weights`.
@@ -71,6 +108,9 @@ pub(crate) struct Job<'a> {
     pub(crate) geo: Geometry,
     pub(crate) first: usize,
     pub(crate) panels: usize,
+    /// Bytes from the first panel to where this thread will probably go on: a hint for prefetching.
+    #[allow(dead_code, reason = "some variants read it")]
+    pub(crate) next: isize,
 }
 
 impl Job<'_> {

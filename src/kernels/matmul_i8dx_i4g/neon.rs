@@ -3,7 +3,7 @@
 
 use std::arch::aarch64::*;
 
-use super::{GROUP, GROUP_BYTES, Job, NR, Tile};
+use super::{GROUP, Geometry, Job, NR, Tile};
 
 #[target_feature(enable = "neon")]
 pub(super) fn run(job: &Job<'_>, tile: &mut Tile<f32>) {
@@ -56,16 +56,17 @@ fn block<const R: usize>(
     let (groups, panel, stride) = (job.geo.groups, job.geo.panel, job.stride);
     let start = (job.first + from.1) * panel;
     let weights = job.weights[start..][..panel].as_ptr();
-    let scales = job.scales[(start + groups * GROUP_BYTES) / 2..][..groups * NR].as_ptr().cast::<u16>();
+    let scales = job.scales[start / 2..][..panel / 2].as_ptr().cast::<u16>();
     let q = job.q[from.0 * stride..][..R * stride].as_ptr();
     let sums = &job.sums[from.0 * groups..][..R * groups];
     let mut total = [[vdupq_n_f32(0.0); 4]; R];
     for g in 0..groups {
         // SAFETY: the 256 bytes of group g of the panel.
-        let w: [uint8x16_t; 16] = std::array::from_fn(|i| unsafe { vld1q_u8(weights.add(g * GROUP_BYTES + i * 16)) });
+        let w: [uint8x16_t; 16] =
+            std::array::from_fn(|i| unsafe { vld1q_u8(weights.add(Geometry::nibbles(g) + i * 16)) });
         for i in 0..4 {
             // SAFETY: 4 of the 16 scales of group g.
-            let scale = unsafe { vld1_u16(scales.add(g * NR + i * 4)) };
+            let scale = unsafe { vld1_u16(scales.add(Geometry::scales(g) + i * 4)) };
             let scale = vcvt_f32_f16(vreinterpret_f16_u16(scale));
             for r in 0..R {
                 // SAFETY: group g of row r, within R rows, `stride` apart.

@@ -1,4 +1,4 @@
-use super::{GROUP, GROUP_BYTES, Job, NR, Tile};
+use super::{GROUP, GROUP_BYTES, Geometry, Job, NR, Tile};
 
 pub(super) fn run(job: &Job<'_>, tile: &mut Tile<f32>) {
     job.check();
@@ -7,10 +7,12 @@ pub(super) fn run(job: &Job<'_>, tile: &mut Tile<f32>) {
         let q = &job.q[r * job.stride..][..padded];
         for p in 0..job.panels {
             let start = (job.first + p) * job.geo.panel;
-            let nibbles = job.weights[start..][..job.geo.groups * GROUP_BYTES].as_chunks::<GROUP_BYTES>().0;
-            let scales = &job.scales[(start + job.geo.groups * GROUP_BYTES) / 2..][..job.geo.groups * NR];
+            let weights = &job.weights[start..][..job.geo.panel];
+            let scales = &job.scales[start / 2..][..job.geo.panel / 2];
             let mut sum = [0.0f32; NR];
-            for ((q, nibbles), scales) in q.chunks_exact(GROUP).zip(nibbles).zip(scales.chunks_exact(NR)) {
+            for (g, q) in q.as_chunks::<GROUP>().0.iter().enumerate() {
+                let nibbles = &weights[Geometry::nibbles(g)..][..GROUP_BYTES];
+                let scales = &scales[Geometry::scales(g)..][..NR];
                 for l in 0..NR {
                     let mut acc = 0i32;
                     for (j, q) in q.as_chunks::<8>().0.iter().enumerate() {

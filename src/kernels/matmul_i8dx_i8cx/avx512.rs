@@ -9,8 +9,8 @@ use crate::kernels::quantize_rows::GROUP;
 
 /// Parts of a panel's columns that are read side by side.
 const STREAMS: usize = 2;
-/// Bytes ahead of each stream that are asked for.
-const AHEAD: usize = 1024;
+/// Lines ahead of each stream that are asked for; at its end, those of the streams that this thread reads next.
+const AHEAD: usize = 16;
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
 pub(super) fn run(job: &Job<'_>, tile: &mut Tile<i32>) {
@@ -49,15 +49,21 @@ fn block<const R: usize, const P: usize>(job: &Job<'_>, p: usize, tile: &mut Til
     }
     let quads = padded / 4;
     let part = quads / STREAMS;
+    // The next panels of this tile, or those of the next tile.
+    let next = if p + P < job.panels { P as isize } else { -(p as isize) } * job.geo.panel as isize;
+    let next = if p + P < job.panels { next } else { next + job.next };
     for k in 0..part {
+        let ahead = (k + AHEAD) as isize;
+        let ahead = if k + AHEAD < part { 64 * ahead } else { next + 64 * (ahead - part as isize) };
         for s in 0..STREAMS {
+            // May point anywhere.
+            let far = weights.wrapping_add(s * part * 64).wrapping_offset(ahead);
             let k = k + s * part;
             for c in 0..P {
                 // SAFETY: k < quads, so the line lies in panel c of the slice; a prefetch may point anywhere.
                 let w = unsafe {
-                    let line = weights.add(c * job.geo.panel + k * 64);
-                    _mm_prefetch::<_MM_HINT_T0>(line.wrapping_add(AHEAD).cast());
-                    _mm512_loadu_si512(line.cast())
+                    _mm_prefetch::<_MM_HINT_T0>(far.wrapping_add(c * job.geo.panel).cast());
+                    _mm512_loadu_si512(weights.add(c * job.geo.panel + k * 64).cast())
                 };
                 for r in 0..R {
                     // SAFETY: 4 bytes at column 4k of row r, within R rows, `stride` apart.

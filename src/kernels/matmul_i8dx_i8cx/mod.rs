@@ -53,6 +53,7 @@ impl Geometry {
     }
 
     /// Byte that holds weight (`row`, `col`).
+    #[cfg(test)]
     pub(crate) fn at(&self, row: usize, col: usize) -> usize {
         let (panel, lane) = (row / NR, row % NR);
         let within = match self.layout {
@@ -61,6 +62,27 @@ impl Geometry {
             Layout::Octets => col / 8 * 128 + lane * 8 + col % 8,
         };
         panel * self.panel + within
+    }
+
+    /// Writes 16 rows (fewer: the last panel) of `cols` weights into the bytes of one panel.
+    pub(crate) fn pack(&self, q: &[i8], cols: usize, panel: &mut [u8]) {
+        let (width, flip) = (if self.layout == Layout::Octets { 8 } else { 4 }, self.encode(0));
+        if cols < self.padded || q.len() < NR * cols {
+            panel.fill(flip);
+        }
+        let swapped = |k: usize| if self.layout == Layout::QuadsPaired { [0, 2, 1, 3][k] } else { k };
+        for (lane, row) in q.chunks_exact(cols).enumerate() {
+            for (from, to) in row.chunks(width).zip(panel.chunks_exact_mut(NR * width)) {
+                let to = &mut to[lane * width..][..width];
+                if let (Ok(from), Ok(to)) = (<[i8; 4]>::try_from(from), <&mut [u8; 4]>::try_from(&mut *to)) {
+                    *to = std::array::from_fn(|k| from[swapped(k)] as u8 ^ flip);
+                } else {
+                    from.iter()
+                        .enumerate()
+                        .for_each(|(k, &v)| to[if width == 4 { swapped(k) } else { k }] = v as u8 ^ flip);
+                }
+            }
+        }
     }
 
     /// The byte for weight `q`; padding is the byte for 0.
@@ -83,6 +105,9 @@ pub(crate) struct Job<'a> {
     pub(crate) geo: Geometry,
     pub(crate) first: usize,
     pub(crate) panels: usize,
+    /// Bytes from the first panel to where this thread will probably go on: a hint for prefetching.
+    #[allow(dead_code, reason = "some variants read it")]
+    pub(crate) next: isize,
 }
 
 impl Job<'_> {

@@ -32,8 +32,13 @@ fn compare(random: &mut Random, rows: usize, cols: usize, w: &[i8], x: impl Fn(&
         for (i, &w) in w.iter().enumerate() {
             weights[geo.at(i / cols, i % cols)] = geo.encode(w);
         }
+        let mut packed = vec![0; geo.panel];
+        for (p, w) in w.chunks(NR * cols).enumerate() {
+            geo.pack(w, cols, &mut packed);
+            assert_eq!(packed[..NR * padded], weights[p * geo.panel..][..NR * padded], "{} {cols}", v.name);
+        }
         let wide = if v.run.wide { &wide[1..] } else { &[] };
-        let job = Job { q, wide, sums: &sums, stride, rows, weights, geo, first, panels };
+        let job = Job { q, wide, sums: &sums, stride, rows, weights, geo, first, panels, next: 0 };
         let mut tile: Tile<i32> = [[7; TILE_COLS]; 16];
         // SAFETY: `available` yields only what this CPU can run.
         unsafe { (v.run.run)(&job, &mut tile) };

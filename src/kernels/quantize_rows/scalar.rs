@@ -5,10 +5,10 @@ pub(super) fn run(x: &[f32], q: &mut [i8], sums: &mut [i32]) -> f32 {
 }
 
 /// Below this a row counts as zero: 127 / max|x| would overflow.
-const TINY: f32 = 1e-30;
+pub(super) const TINY: f32 = 1e-30;
 
 /// Rounds to nearest even: the low byte of x + MAGIC is the integer, for |x| < 2^22.
-const MAGIC: f32 = 12_582_912.0;
+pub(super) const MAGIC: f32 = 12_582_912.0;
 
 /// Magnitudes are compared as integers: exact, and a NaN is larger than everything.
 #[inline(always)]
