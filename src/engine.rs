@@ -4,17 +4,35 @@ use crate::audio::{AudioEncoder, AudioWeights};
 use crate::bundle::{AudioSource, BundleFile, LoadMode, Tensors};
 use crate::config::Config;
 use crate::error::{Error, ErrorKind, Result};
-use crate::flow::{ConditionLayout, FlowNet};
+use crate::flow::{ConditionLayout, FlowNet, Nets};
 use crate::frame::{BLOCK_FRAMES, Sampler};
 use crate::kernels::{Exec, Kernels, KvDtype, Limits};
 use crate::pose::feature_count;
-use crate::session::{Session, SessionOptions};
+use crate::session::{Session, SessionOptions, Team};
 use crate::vae::{Decoder, Encoder};
 use std::path::Path;
 use std::sync::Arc;
 
 /// Most frames of an idle clip: every session starts by going through them.
 const MAX_IDLE_FRAMES: usize = 3600;
+
+/// Which networks of a bundle an engine holds: what no session will use need not take memory, nor time to load.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Networks {
+    /// The network of the samplers with steps: midpoint and Euler. Without it sessions need [`Sampler::Single`].
+    pub reference: bool,
+    /// The student of the single-step sampler, where the bundle has one.
+    pub student: bool,
+    /// The encoder of motion. Without it sessions do not re-anchor, whatever [`crate::session::Anchoring`] says.
+    pub encoder: bool,
+}
+
+impl Default for Networks {
+    /// All.
+    fn default() -> Self {
+        Self { reference: true, student: true, encoder: true }
+    }
+}
 
 /// A loaded model: networks packed for this CPU, rig and statistics. Immutable and shared; all that changes is in
 /// [`Session`].
@@ -40,9 +58,9 @@ pub struct Engine {
     pub(crate) audio: AudioWeights,
     #[cfg(feature = "tract")]
     pub(crate) audio_source: AudioSource,
-    pub(crate) encoder: Encoder,
+    pub(crate) encoder: Option<Encoder>,
     pub(crate) decoder: Decoder,
-    pub(crate) flow: FlowNet,
+    pub(crate) flow: Option<FlowNet>,
     pub(crate) student: Option<FlowNet>,
     pub(crate) pose: Standard,
     pub(crate) latent: Standard,
@@ -96,17 +114,53 @@ impl Engine {
     /// # Errors
     /// As [`Engine::load`].
     pub fn from_file(file: &BundleFile<'_>, kernels: Kernels) -> Result<Arc<Self>> {
+        Self::from_file_with(file, kernels, Networks::default())
+    }
+
+    /// As [`Engine::from_file`], some networks only. The others' tensors are not read, so not checked.
+    ///
+    /// ```no_run
+    /// # fn main() -> visavis::error::Result<()> {
+    /// use visavis::bundle::BundleFile;
+    /// use visavis::engine::{Engine, Networks};
+    /// use visavis::frame::Sampler;
+    /// use visavis::kernels::Kernels;
+    /// use visavis::session::SessionOptions;
+    ///
+    /// // A headset that only ever makes a single step.
+    /// let small = Networks { reference: false, encoder: false, ..Networks::default() };
+    /// let file = BundleFile::open("models/visavis-base.safetensors")?;
+    /// let engine = Engine::from_file_with(&file, Kernels::detect()?, small)?;
+    /// let session = engine.session(SessionOptions { sampler: Sampler::Single, ..SessionOptions::default() })?;
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Engine::load`]; [`ErrorKind::Argument`] when neither the reference network nor a student is left.
+    pub fn from_file_with(file: &BundleFile<'_>, kernels: Kernels, networks: Networks) -> Result<Arc<Self>> {
         let (config, tensors) = file.parse()?;
-        let engine = Self::build(config, &tensors, kernels).map_err(|e| e.with_path(file.path()))?;
+        let engine = Self::build(config, &tensors, kernels, networks).map_err(|e| e.with_path(file.path()))?;
         Ok(Arc::new(engine))
     }
 
     /// An engine of given tensors; [`Engine::from_file`] is the way for bundles.
-    pub(crate) fn from_tensors(config: Config, t: &Tensors<'_>, kernels: Kernels) -> Result<Arc<Self>> {
-        Self::build(config, t, kernels).map(Arc::new)
+    pub(crate) fn from_tensors(
+        config: Config,
+        t: &Tensors<'_>,
+        kernels: Kernels,
+        networks: Networks,
+    ) -> Result<Arc<Self>> {
+        Self::build(config, t, kernels, networks).map(Arc::new)
     }
 
-    fn build(config: Config, t: &Tensors<'_>, kernels: Kernels) -> Result<Self> {
+    fn build(config: Config, t: &Tensors<'_>, kernels: Kernels, networks: Networks) -> Result<Self> {
+        let student = networks.student && config.student.is_some();
+        if !networks.reference && !student {
+            let message =
+                "no network to make motion with: load the reference network, or the student of a bundle that has one";
+            return Err(Error::new(ErrorKind::Argument, message));
+        }
         let features = feature_count(config.rig.joints.len());
         let latent = config.vae.latent;
         let layout = ConditionLayout { audio_features: config.audio.features };
@@ -117,14 +171,21 @@ impl Engine {
             );
             return Err(Error::new(ErrorKind::BundleInvalid, message));
         }
-        let net = |prefix| FlowNet::load(t, kernels, &config.flow, latent, layout, prefix);
+        let net = |prefix: &str, wanted: bool| {
+            if !wanted {
+                t.skip(&format!("{prefix}."));
+                return Ok(None);
+            }
+            FlowNet::load(t, kernels, &config.flow, latent, layout, prefix).map(Some)
+        };
         let audio_source = AudioSource::load(t, &config.audio)?;
+        let encoder = Encoder::load(t, kernels, &config.vae, features)?;
         let mut engine = Self {
             audio: audio_source.pack(kernels, &config.audio)?,
-            encoder: Encoder::load(t, kernels, &config.vae, features)?,
+            encoder: None,
             decoder: Decoder::load(t, kernels, &config.vae, features)?,
-            flow: net("flow")?,
-            student: config.student.map(|_| net("student")).transpose()?,
+            flow: net("flow", networks.reference)?,
+            student: net("student", student)?,
             pose: Standard::load(t, "stats.pose", features)?,
             latent: Standard::load(t, "stats.latent", latent)?,
             idle: Vec::new(),
@@ -134,25 +195,41 @@ impl Engine {
             config,
         };
         t.finish()?;
-        engine.idle = engine.encode(&idle)?;
+        engine.idle = engine.encode(&encoder, &idle)?;
+        engine.encoder = networks.encoder.then_some(encoder);
         Ok(engine)
     }
 
     /// Standardised latents `[n / 4, latent]` of `n` consecutive unstandardised feature vectors.
-    fn encode(&self, frames: &[f32]) -> Result<Vec<f32>> {
+    fn encode(&self, encoder: &Encoder, frames: &[f32]) -> Result<Vec<f32>> {
         let (block, latent) = (BLOCK_FRAMES * self.features(), self.latent.mean.len());
         let mut exec = self.exec(1)?;
-        let mut state = self.encoder.state(KvDtype::F32);
+        let mut state = encoder.state(KvDtype::F32);
         let mut latents = vec![0.0; frames.len() / block * latent];
         let mut standardised = vec![0.0; block];
         exec.begin();
         for (frames, z) in frames.chunks_exact(block).zip(latents.chunks_exact_mut(latent)) {
             self.pose.standardise(frames, &mut standardised);
-            self.encoder.step(&mut exec, &mut state, &standardised, z);
+            encoder.step(&mut exec, &mut state, &standardised, z);
             self.latent.standardise_in_place(z);
         }
         exec.end();
         Ok(latents)
+    }
+
+    /// The networks that make latents.
+    pub(crate) fn nets(&self) -> Nets<'_> {
+        let student = self.student.as_ref().zip(self.config.student.map(|s| s.tau_history));
+        Nets { reference: self.flow.as_ref(), student }
+    }
+
+    /// The encoder of motion, for whoever cannot do without.
+    ///
+    /// # Errors
+    /// [`ErrorKind::State`] when it was not loaded.
+    pub(crate) fn encoder(&self) -> Result<&Encoder> {
+        let missing = || Error::new(ErrorKind::State, "this engine was loaded without the encoder; load all networks");
+        self.encoder.as_ref().ok_or_else(missing)
     }
 
     /// Starts a session; all memory that it will need is taken here.
@@ -161,6 +238,14 @@ impl Engine {
     /// [`ErrorKind::Argument`] when an option is out of range or the bundle cannot do it.
     pub fn session(self: &Arc<Self>, options: SessionOptions) -> Result<Session> {
         Session::new(Arc::clone(self), options)
+    }
+
+    /// What it takes to step several sessions of this engine together, on `threads` threads (1 or 2): [`Team`] tells how.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] for another number of threads; [`ErrorKind::Io`] when the second one cannot be started.
+    pub fn team(self: &Arc<Self>, threads: usize) -> Result<Team> {
+        Team::new(Arc::clone(self), threads)
     }
 
     /// The bundle's configuration.
@@ -181,19 +266,16 @@ impl Engine {
     /// Bytes of all packed weights.
     pub fn weight_bytes(&self) -> usize {
         let net = |n: &FlowNet| n.pass_bytes() + n.condition_bytes() + n.modulation_bytes();
-        let flows = net(&self.flow) + self.student.as_ref().map_or(0, net);
-        flows + self.encoder.bytes() + self.decoder.bytes() + self.audio.bytes()
+        let flows: usize = self.flow.iter().chain(&self.student).map(net).sum();
+        flows + self.encoder.as_ref().map_or(0, Encoder::bytes) + self.decoder.bytes() + self.audio.bytes()
     }
 
     /// Bytes of packed weights that a block with `sampler` reads: the flow once an evaluation, the decoder once, the audio
     /// encoder once a voice. Re-anchoring and slots that catch up come on top.
     pub fn block_bytes(&self, sampler: Sampler) -> usize {
-        let net = match (sampler, &self.student) {
-            (Sampler::Single, Some(student)) => student,
-            _ => &self.flow,
-        };
-        let evaluations = sampler.evaluations();
-        evaluations * net.pass_bytes() + net.condition_bytes() + self.decoder.bytes() + 2 * self.audio.bytes()
+        let nets = self.nets();
+        let (pass, condition) = nets.of(sampler).map_or((0, 0), |net| (net.pass_bytes(), net.condition_bytes()));
+        sampler.evaluations() * pass + condition + self.decoder.bytes() + 2 * self.audio.bytes()
     }
 
     /// Width of a pose feature vector.
@@ -278,7 +360,7 @@ mod tests {
         let engine = Engine::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/goldens/tiny.safetensors")).unwrap();
         let mut expected = golden("encoder.mu");
         expected.chunks_exact_mut(engine.config.vae.latent).for_each(|mu| engine.latent.standardise_in_place(mu));
-        let latents = engine.encode(&golden("encoder.frames")).unwrap();
+        let latents = engine.encode(engine.encoder().unwrap(), &golden("encoder.frames")).unwrap();
         assert_eq!(latents.len(), expected.len());
         let error = latents.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(error < 1e-4, "{error}");

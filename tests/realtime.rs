@@ -114,4 +114,26 @@ fn a_running_session_does_not_allocate() {
         let stats = session.stats().governor;
         assert!(stats.held_blocks > 0 && stats.catch_up_passes > 0, "{stats:?}");
     }
+    // Sessions stepped together, some of which share passes.
+    for (engine, threads) in engines.iter().flat_map(|e| [(e, 1), (e, 2)]) {
+        let mut team = engine.team(threads).unwrap();
+        let mut sessions: Vec<_> = (0..5)
+            .map(|seed| {
+                let gaze = (seed == 1).then_some(0.5);
+                let options = SessionOptions { seed, gaze, anchoring: Anchoring::Every(10), ..Default::default() };
+                engine.session(options).unwrap()
+            })
+            .collect();
+        let mut due: Vec<_> = sessions.iter_mut().map(|session| (session, 0.0)).collect();
+        team.step(&mut due).unwrap();
+        let calls = allocations(|| {
+            for block in 1..40 {
+                due.iter_mut().for_each(|(session, now)| *now = session.next_due());
+                due[4].0.set_sampler([Sampler::Midpoint(4), Sampler::Single][block / 7 % 2]).unwrap();
+                assert_eq!(team.step(&mut due).unwrap(), 5);
+            }
+        });
+        assert_eq!(calls, 0, "allocations of a team of {threads} threads");
+        assert!(team.shared_blocks() > 40);
+    }
 }

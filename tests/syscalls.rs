@@ -118,4 +118,20 @@ fn blocks_make_no_system_call() {
         }
     };
     assert_eq!(confined(|| governed(&mut session)), Fate::Through);
+
+    let engine = tiny();
+    let mut team = engine.team(1).unwrap();
+    let mut sessions = [1, 2].map(|seed| engine.session(SessionOptions { seed, ..Default::default() }).unwrap());
+    sessions.iter_mut().for_each(|session| drop(common::run(session, &inputs, 1)));
+    let mut together = || {
+        let [a, b] = &mut sessions;
+        let mut all = true;
+        for _ in 0..40 {
+            let (now_a, now_b) = (a.next_due(), b.next_due());
+            all &= team.step(&mut [(&mut *a, now_a), (&mut *b, now_b)]).is_ok_and(|count| count == 2);
+        }
+        // A panic calls the system, which is fatal.
+        assert!(all && team.shared_blocks() == 80);
+    };
+    assert_eq!(confined(&mut together), Fate::Through);
 }

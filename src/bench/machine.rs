@@ -68,9 +68,24 @@ fn sum(data: &[u64]) -> u64 {
     sums.as_flattened().iter().fold(0, |all, sum| all.wrapping_add(*sum))
 }
 
-/// Most memory that this process has had resident, bytes.
+/// Lets the count of the most resident memory start anew, where the system has that.
+pub(super) fn reset_peak() {
+    // Without it the peak is the whole process's, as the report says.
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+}
+
+/// Memory of this process that is resident now, bytes.
+pub(super) fn resident() -> Option<u64> {
+    status("VmRSS:")
+}
+
+/// The most that was, since [`reset_peak`].
 pub(super) fn peak_resident() -> Option<u64> {
+    status("VmHWM:")
+}
+
+fn status(key: &str) -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    let line = status.lines().find(|line| line.starts_with(key))?;
     Some(1024 * line.split_whitespace().nth(1)?.parse::<u64>().ok()?)
 }

@@ -18,7 +18,7 @@ pub use stages::{STAGES, StageTimes};
 use crate::engine::Engine;
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES, FPS, SAMPLE_RATE, Sampler};
-use crate::session::{Session, SessionOptions};
+use crate::session::{Session, SessionOptions, Team};
 use glam::Vec3;
 use serde::Serialize;
 use std::sync::Arc;
@@ -32,10 +32,20 @@ const WARM_UP: usize = 16;
 pub struct BenchOptions {
     /// Sampler.
     pub sampler: Sampler,
-    /// Threads of the session, 1 or 2.
+    /// Threads that compute, 1 or 2.
     pub threads: usize,
+    /// Sessions that are stepped together ([`Team`]); one is polled by itself.
+    pub sessions: usize,
     /// Blocks that are timed.
     pub blocks: usize,
+    /// Counts the allocations of this process so far, where the program can: those of the timed blocks are reported.
+    pub allocations: Option<fn() -> u64>,
+}
+
+impl Default for BenchOptions {
+    fn default() -> Self {
+        Self { sampler: Sampler::Midpoint(4), threads: 1, sessions: 1, blocks: 200, allocations: None }
+    }
 }
 
 /// What was measured. Times are milliseconds.
@@ -47,29 +57,39 @@ pub struct Bench {
     pub sampler: String,
     /// Threads.
     pub threads: usize,
-    /// Blocks that were timed.
+    /// Sessions, stepped together where there are several.
+    pub sessions: usize,
+    /// Blocks of each session that were timed.
     pub blocks: usize,
-    /// Time of a block: median, 95th and 99th percentile, longest.
+    /// Time of a block, of all sessions together: median, 95th and 99th percentile, longest.
     pub block_ms: [f64; 4],
-    /// Mean times of the stages of a block, of as many further blocks.
-    pub stages: StageTimes,
-    /// Frames a second at the median.
+    /// Mean times of the stages of a block, of as many further blocks; `None` with several sessions.
+    pub stages: Option<StageTimes>,
+    /// Frames a second at the median, of all sessions together.
     pub frames_per_second: f64,
-    /// Seconds of motion a second at the median.
+    /// Seconds of motion a second at the median, of each session.
     pub real_time_factor: f64,
-    /// Bytes of packed weights that a block reads.
+    /// Blocks of sessions that shared passes over the weights with another session's, a block of all.
+    pub shared_blocks: f64,
+    /// Bytes of packed weights that a block of one session reads.
     pub weight_bytes_a_block: usize,
-    /// The same a second at the median, GB/s.
+    /// The same a second at the median, GB/s; of several sessions as if each read its own.
     pub weights_gb_s: f64,
     /// What a plain reading loop gets from memory with as many threads, GB/s: median of several.
     pub read_limit_gb_s: f64,
-    /// From the session's making to its first frame.
+    /// Share of that which one session's weights take.
+    pub share_of_read_limit: f64,
+    /// Allocations and releases while the timed blocks were computed, where they were counted.
+    pub steady_allocations: Option<u64>,
+    /// From the making of the sessions to their first frames.
     pub first_frame_ms: f64,
     /// Bytes of all packed weights.
     pub weight_bytes: usize,
-    /// Bytes of the session's caches.
+    /// Bytes of the sessions' caches.
     pub cache_bytes: usize,
-    /// Most memory that this process has had resident so far, bytes, where the system tells.
+    /// Memory of this process that is resident after the timed blocks, bytes, where the system tells.
+    pub resident_bytes: Option<u64>,
+    /// The most that was, from the making of the sessions on (where the system does not let the peak be reset: of the process).
     pub peak_resident_bytes: Option<u64>,
 }
 
@@ -77,79 +97,138 @@ impl Bench {
     /// Measures `engine`; takes as long as twice the blocks do, and about a second for memory.
     ///
     /// # Errors
-    /// Those of making a session; [`ErrorKind::Argument`] for no blocks.
+    /// Those of making a session; [`ErrorKind::Argument`] for no blocks or no sessions.
     pub fn run(engine: &Arc<Engine>, options: BenchOptions) -> Result<Self> {
-        let BenchOptions { sampler, threads, blocks } = options;
-        if blocks == 0 {
-            return Err(Error::new(ErrorKind::Argument, "no blocks to measure"));
+        let BenchOptions { sampler, threads, sessions, blocks, allocations } = options;
+        if blocks == 0 || sessions == 0 {
+            return Err(Error::new(ErrorKind::Argument, "nothing to measure: at least one block of one session"));
         }
+        machine::reset_peak();
         let started = Instant::now();
-        let mut talk = Talk::new(engine.session(SessionOptions { sampler, threads, ..SessionOptions::default() })?)?;
-        talk.block(None)?;
+        let mut talks = Talks::new(engine, sampler, threads, sessions)?;
+        talks.block(None)?;
         let first_frame_ms = ms(started.elapsed());
         for _ in 0..WARM_UP {
-            talk.block(None)?;
+            talks.block(None)?;
         }
-        let mut times = (0..blocks).map(|_| talk.block(None)).collect::<Result<Vec<_>>>()?;
-        let mut stages = StageTimes::default();
+        let mut times = Vec::with_capacity(blocks);
+        let mut calls = 0;
+        let shared = talks.shared_blocks();
         for _ in 0..blocks {
-            talk.block(Some(&mut stages))?;
+            talks.hear()?;
+            let (time, made) = talks.compute(None, allocations.unwrap_or(|| 0))?;
+            times.push(time);
+            calls += made;
+        }
+        let shared = talks.shared_blocks() - shared;
+        let (resident_bytes, peak_resident_bytes) = (machine::resident(), machine::peak_resident());
+        let mut stages = StageTimes::default();
+        if sessions == 1 {
+            for _ in 0..blocks {
+                talks.block(Some(&mut stages))?;
+            }
         }
         times.sort();
         let at = |share: f64| ms(times[((share * blocks as f64).ceil() as usize).clamp(1, blocks) - 1]);
         let median = at(0.5);
         let bytes = engine.block_bytes(sampler);
+        let (rate, limit) = (bytes as f64 / median / 1e6, read_limit(threads));
         Ok(Self {
             model: engine.config().name.clone(),
             sampler: sampler.to_string(),
             threads,
+            sessions,
             blocks,
             block_ms: [median, at(0.95), at(0.99), at(1.0)],
-            stages: stages.mean(blocks),
-            frames_per_second: 1000.0 * BLOCK_FRAMES as f64 / median,
+            stages: (sessions == 1).then(|| stages.mean(blocks)),
+            frames_per_second: 1000.0 * (sessions * BLOCK_FRAMES) as f64 / median,
             real_time_factor: 1000.0 * BLOCK_FRAMES as f64 / f64::from(FPS) / median,
+            shared_blocks: shared as f64 / blocks as f64,
             weight_bytes_a_block: bytes,
-            weights_gb_s: bytes as f64 / median / 1e6,
-            read_limit_gb_s: read_limit(threads),
+            weights_gb_s: rate * sessions as f64,
+            read_limit_gb_s: limit,
+            share_of_read_limit: rate / limit,
+            steady_allocations: allocations.map(|_| calls),
             first_frame_ms,
             weight_bytes: engine.weight_bytes(),
-            cache_bytes: talk.session.stats().cache_bytes,
-            peak_resident_bytes: machine::peak_resident(),
+            cache_bytes: talks.cache_bytes(),
+            resident_bytes,
+            peak_resident_bytes,
         })
     }
 }
 
-/// A session in a made-up conversation: two voices, a user who circles.
-struct Talk {
-    session: Session,
+/// Sessions in a made-up conversation each: two voices, a user who circles.
+struct Talks {
+    sessions: Vec<Session>,
+    team: Option<Team>,
     samples: Vec<f32>,
 }
 
-impl Talk {
-    fn new(session: Session) -> Result<Self> {
+impl Talks {
+    fn new(engine: &Arc<Engine>, sampler: Sampler, threads: usize, sessions: usize) -> Result<Self> {
         let tone = |i: usize| {
             let t = i as f32 / SAMPLE_RATE as f32;
             0.2 * (900.0 * t).sin() * (23.0 * t).sin().max(0.0)
         };
-        Ok(Self { session, samples: (0..BLOCK_SAMPLES).map(tone).collect() })
+        let team = (sessions > 1).then(|| engine.team(threads)).transpose()?;
+        // A team has the threads.
+        let threads = if team.is_some() { 1 } else { threads };
+        let session =
+            |seed| engine.session(SessionOptions { sampler, threads, seed: seed as u64, ..SessionOptions::default() });
+        let sessions = (0..sessions).map(session).collect::<Result<_>>()?;
+        Ok(Self { sessions, team, samples: (0..BLOCK_SAMPLES).map(tone).collect() })
     }
 
-    /// One block; the time that computing it took, without pushing.
-    fn block(&mut self, probe: Option<&mut StageTimes>) -> Result<Duration> {
-        let now = self.session.next_due();
-        self.session.push_agent_audio(&self.samples, SAMPLE_RATE)?;
-        self.session.push_user_audio(&self.samples, SAMPLE_RATE)?;
-        let angle = 0.4 * now as f32;
-        self.session.push_user_head(Vec3::new(1.5 * angle.sin(), 1.65, 1.5 * angle.cos()), now)?;
-        let started = Instant::now();
+    /// Pushes what the next block hears and sees.
+    fn hear(&mut self) -> Result<()> {
+        for session in &mut self.sessions {
+            let now = session.next_due();
+            session.push_agent_audio(&self.samples, SAMPLE_RATE)?;
+            session.push_user_audio(&self.samples, SAMPLE_RATE)?;
+            let angle = 0.4 * now as f32;
+            session.push_user_head(Vec3::new(1.5 * angle.sin(), 1.65, 1.5 * angle.cos()), now)?;
+        }
+        Ok(())
+    }
+
+    /// Computes the next block of all; the time that it took, and by how much `count` went up. Only a session by itself has a probe.
+    fn compute(&mut self, probe: Option<&mut StageTimes>, count: fn() -> u64) -> Result<(Duration, u64)> {
+        if let Some(team) = &mut self.team {
+            let mut due: Vec<_> = (self.sessions.iter_mut())
+                .map(|session| {
+                    let now = session.next_due();
+                    (session, now)
+                })
+                .collect();
+            let (before, started) = (count(), Instant::now());
+            team.step(&mut due)?;
+            return Ok((started.elapsed(), count() - before));
+        }
+        let session = &mut self.sessions[0];
+        let now = session.next_due();
+        let (before, started) = (count(), Instant::now());
         match probe {
-            None => self.session.poll(now)?,
+            None => session.poll(now)?,
             Some(stages) => {
                 stages.start();
-                self.session.poll_with(now, Some(stages))?
+                session.poll_with(now, Some(stages))?
             }
         };
-        Ok(started.elapsed())
+        Ok((started.elapsed(), count() - before))
+    }
+
+    fn block(&mut self, probe: Option<&mut StageTimes>) -> Result<()> {
+        self.hear()?;
+        self.compute(probe, || 0).map(drop)
+    }
+
+    fn shared_blocks(&self) -> u64 {
+        self.team.as_ref().map_or(0, Team::shared_blocks)
+    }
+
+    fn cache_bytes(&self) -> usize {
+        self.sessions.iter().map(|session| session.stats().cache_bytes).sum()
     }
 }
 

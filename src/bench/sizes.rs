@@ -4,7 +4,7 @@ use crate::bundle::Tensors;
 use crate::config::{
     AudioConfig, Config, ConvConfig, FORMAT, FlowConfig, PoseConfig, SessionConfig, StudentConfig, VaeConfig,
 };
-use crate::engine::Engine;
+use crate::engine::{Engine, Networks};
 use crate::error::{Error, ErrorKind, Result};
 use crate::kernels::{Kernels, Scheme};
 use crate::pose::{Joint, Rig};
@@ -37,7 +37,15 @@ impl Size {
     /// # Errors
     /// None for these sizes; those of [`Engine::from_file`] if they were not sound.
     pub fn engine(self, scheme: Scheme, kernels: Kernels) -> Result<Arc<Engine>> {
-        Engine::from_tensors(self.config(), &Tensors::seeded(scheme), kernels)
+        self.engine_with(scheme, kernels, Networks::default())
+    }
+
+    /// As [`Size::engine`], some networks only.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] without a network that makes motion.
+    pub fn engine_with(self, scheme: Scheme, kernels: Kernels, networks: Networks) -> Result<Arc<Engine>> {
+        Engine::from_tensors(self.config(), &Tensors::seeded(scheme), kernels, networks)
     }
 
     fn config(self) -> Config {

@@ -23,8 +23,8 @@ pub struct StageTimes {
 }
 
 impl StageTimes {
-    /// A block begins.
-    pub(super) fn start(&mut self) {
+    /// A block begins: the next stage is timed from here.
+    pub fn start(&mut self) {
         self.last = Some(Instant::now());
     }
 

@@ -133,6 +133,13 @@ impl<'a> Tensors<'a> {
         Ok(kernels.pack(weights.borrow(), Some(&bias)).named(name))
     }
 
+    /// Leaves the tensors whose names begin with `prefix` alone: [`Tensors::finish`] does not miss them.
+    pub fn skip(&self, prefix: &str) {
+        let recorded = self.quantisation.iter().flat_map(|q| q.tensors.keys().map(String::as_str));
+        let names = self.container.iter().flat_map(SafeTensors::names).chain(recorded);
+        self.read.borrow_mut().extend(names.filter(|name| name.starts_with(prefix)).map(str::to_owned));
+    }
+
     /// Fails if the bundle holds, or its config records, tensors that nothing has read.
     ///
     /// # Errors

@@ -1,11 +1,12 @@
 //! `visavis bench`: how fast a bundle, or a size, runs here.
 
-use super::{files, print};
+use super::{allocations, files, print};
 use clap::Args;
 use std::fmt::Write;
 use std::path::PathBuf;
 use visavis::bench::{Bench, BenchOptions, Machine, STAGES, Size};
-use visavis::engine::Engine;
+use visavis::bundle::BundleFile;
+use visavis::engine::{Engine, Networks};
 use visavis::error::Result;
 use visavis::frame::Sampler;
 use visavis::kernels::{Kernels, Scheme};
@@ -21,12 +22,18 @@ pub struct BenchArgs {
     /// How the weights of --size are stored: f32, f16, i8 or i4
     #[arg(long, value_name = "SCHEME", default_value = "i8", requires = "size")]
     pub scheme: Scheme,
-    /// midpoint4, midpoint2, midpoint1, euler:N or single
-    #[arg(long, value_name = "NAME", num_args = 1.., default_values = ["midpoint4", "single"])]
+    /// midpoint4, midpoint2, midpoint1, euler:N or single, or several: midpoint4,single
+    #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',', default_values = ["midpoint4", "single"])]
     pub sampler: Vec<Sampler>,
+    /// Networks to load: all, or those that the samplers need and no encoder, so no re-anchoring (lean)
+    #[arg(long, value_name = "SET", default_value = "all")]
+    pub networks: NetworkSet,
     /// Threads, 1 or 2, or both one after the other: 1,2
     #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1,2", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=2))]
     pub threads: Vec<usize>,
+    /// Sessions that are stepped together, or several numbers one after the other: 1,4
+    #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=64))]
+    pub sessions: Vec<usize>,
     /// Blocks that are timed
     #[arg(long, value_name = "N", default_value = "200", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=1_000_000))]
     pub blocks: usize,
@@ -35,18 +42,48 @@ pub struct BenchArgs {
     pub json: bool,
 }
 
+/// Which networks are loaded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum NetworkSet {
+    /// All of the bundle.
+    All,
+    /// Those that the samplers need, without the encoder.
+    Lean,
+}
+
+impl NetworkSet {
+    fn of(self, samplers: &[Sampler]) -> Networks {
+        match self {
+            Self::All => Networks::default(),
+            Self::Lean => Networks {
+                reference: samplers.iter().any(|sampler| *sampler != Sampler::Single),
+                student: samplers.contains(&Sampler::Single),
+                encoder: false,
+            },
+        }
+    }
+}
+
 pub fn run(args: &BenchArgs) -> Result<()> {
     let started = std::time::Instant::now();
+    let networks = args.networks.of(&args.sampler);
     let engine = match args.size {
-        Some(size) => size.engine(args.scheme, Kernels::detect()?)?,
-        None => Engine::load(files::model(args.model.as_deref())?)?,
+        Some(size) => size.engine_with(args.scheme, Kernels::detect()?, networks)?,
+        None => {
+            let file = BundleFile::open(files::model(args.model.as_deref())?)?;
+            Engine::from_file_with(&file, Kernels::detect()?, networks)?
+        }
     };
     let load_ms = 1000.0 * started.elapsed().as_secs_f64();
     let (machine, kernels) = (Machine::here(), engine.kernels());
     let mut benches = Vec::new();
+    let allocations: Option<fn() -> u64> = Some(allocations::count);
     for &sampler in &args.sampler {
         for &threads in &args.threads {
-            benches.push(Bench::run(&engine, BenchOptions { sampler, threads, blocks: args.blocks })?);
+            for &sessions in &args.sessions {
+                let options = BenchOptions { sampler, threads, sessions, blocks: args.blocks, allocations };
+                benches.push(Bench::run(&engine, options)?);
+            }
         }
     }
     if args.json {
@@ -60,6 +97,11 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     let mut text = String::new();
     // Writing to a string does not fail.
     let _ = writeln!(text, "{} ({} processors), {} kernels", machine.cpu, machine.processors, kernels.level());
+    let _ = writeln!(
+        text,
+        "{}",
+        kernels.variants().iter().map(|(name, v)| format!("{name} {v}")).collect::<Vec<_>>().join(", ")
+    );
     let made = if args.size.is_some() { "drawn and packed" } else { "loaded" };
     let _ = writeln!(text, "{}, {made} in {load_ms:.0} ms", engine.config().name);
     benches.iter().for_each(|bench| text.push_str(&lines(bench)));
@@ -68,23 +110,47 @@ pub fn run(args: &BenchArgs) -> Result<()> {
 
 fn lines(b: &Bench) -> String {
     let [p50, p95, p99, max] = b.block_ms;
-    let stages: Vec<_> = STAGES.iter().zip(b.stages.all()).map(|(name, time)| format!("{name} {time:.2}")).collect();
-    let resident = b.peak_resident_bytes.map_or_else(|| "unknown".into(), |bytes| format!("{} MB", bytes / 1_000_000));
-    format!(
-        "\n{}, {} thread{}: {:.0} frames/s, {:.1} x real time\n  block    p50 {p50:.2}, p95 {p95:.2}, p99 {p99:.2}, max {max:.2} ms of 133.3 ms\n  \
-         stages   {} ms\n  weights  {:.1} MB a block, {:.1} GB/s; a reading loop gets {:.1} GB/s here now\n  \
-         memory   weights {} MB, caches {} MB, peak resident {resident}\n  start    first frame {:.0} ms after the engine\n",
+    let many = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
+    let megabytes = |bytes: Option<u64>| bytes.map_or_else(|| "unknown".into(), |b| format!("{} MB", b / 1_000_000));
+    let mut text = format!(
+        "\n{}, {}, {}: {:.0} frames/s, {:.1} x real time\n",
         b.sampler,
-        b.threads,
-        if b.threads == 1 { "" } else { "s" },
+        many(b.threads, "thread"),
+        many(b.sessions, "session"),
         b.frames_per_second,
         b.real_time_factor,
-        stages.join(", "),
-        b.weight_bytes_a_block as f64 / 1e6,
-        b.weights_gb_s,
-        b.read_limit_gb_s,
-        b.weight_bytes / 1_000_000,
-        b.cache_bytes / 1_000_000,
-        b.first_frame_ms,
-    )
+    );
+    let mut line = |name: &str, what: String| text.push_str(&format!("  {name:<8} {what}\n"));
+    line("block", format!("p50 {p50:.2}, p95 {p95:.2}, p99 {p99:.2}, max {max:.2} ms of 133.3 ms"));
+    if let Some(stages) = &b.stages {
+        let stages: Vec<_> = STAGES.iter().zip(stages.all()).map(|(name, time)| format!("{name} {time:.2}")).collect();
+        line("stages", format!("{} ms", stages.join(", ")));
+    } else {
+        line("shared", format!("{:.1} of {} blocks shared passes over the weights", b.shared_blocks, b.sessions));
+    }
+    line(
+        "weights",
+        format!(
+            "{:.1} MB a block and session, {:.1} GB/s; a reading loop gets {:.1} GB/s here now: {:.0} % of it for one session's",
+            b.weight_bytes_a_block as f64 / 1e6,
+            b.weights_gb_s,
+            b.read_limit_gb_s,
+            100.0 * b.share_of_read_limit,
+        ),
+    );
+    line(
+        "memory",
+        format!(
+            "weights {} MB, caches {} MB, resident {}, at most {}",
+            b.weight_bytes / 1_000_000,
+            b.cache_bytes / 1_000_000,
+            megabytes(b.resident_bytes),
+            megabytes(b.peak_resident_bytes),
+        ),
+    );
+    if let Some(calls) = b.steady_allocations {
+        line("steady", many(calls as usize, "allocation"));
+    }
+    line("start", format!("first frame {:.0} ms after the engine", b.first_frame_ms));
+    text
 }

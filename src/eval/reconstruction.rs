@@ -79,7 +79,7 @@ fn through(engine: &Engine, frames: &[Frame]) -> Result<Vec<Frame>> {
     let radius = engine.config.pose.radius;
     let width = engine.features();
     let mut exec = engine.exec(1)?;
-    let (mut encoder, mut decoder) = (engine.encoder.state(KvDtype::F32), engine.decoder.state(KvDtype::F32));
+    let (mut encoder, mut decoder) = (engine.encoder()?.state(KvDtype::F32), engine.decoder.state(KvDtype::F32));
     let (mut features, mut motion) = (Encoder::new(radius), Decoder::new(engine.kernels, rig, radius));
     motion.reset(frames.first().map(|f| f.root).unwrap_or_default());
     let (mut x, mut raw) = (vec![0.0; BLOCK_FRAMES * width], vec![0.0; BLOCK_FRAMES * width]);
@@ -92,7 +92,7 @@ fn through(engine: &Engine, frames: &[Frame]) -> Result<Vec<Frame>> {
             features.encode(frame.root, &frame.global, x);
         }
         engine.pose.standardise(&raw, &mut x);
-        engine.encoder.step(&mut exec, &mut encoder, &x, &mut latent);
+        engine.encoder()?.step(&mut exec, &mut encoder, &x, &mut latent);
         engine.decoder.step(&mut exec, &mut decoder, &latent, &mut x);
         engine.pose.restore(&mut x);
         motion.decode_block(&x, &mut block)?;

@@ -12,6 +12,7 @@
 //! | `network` | weights; embeddings, modulation tables |
 //! | `slots` | one cache a slot; passes over a few rows |
 //! | `sampler` | midpoint, Euler and single-step integration with guidance |
+//! | `shared` | passes that several generators share |
 //! | `noise` | the counter-based generator |
 //!
 //! Mirrors `training/visavis_train/nets/flow.py`.
@@ -21,11 +22,13 @@ mod history;
 mod network;
 mod noise;
 mod sampler;
+mod shared;
 mod slots;
 
 pub use condition::{Condition, ConditionLayout};
 pub use history::History;
 pub use network::{FlowNet, Modulation};
 pub use noise::normal;
-pub use sampler::{Generator, GeneratorOptions, Guidance, X1Tap};
+pub use sampler::{Generator, GeneratorOptions, Guidance, Nets, X1Tap};
+pub use shared::{SHARED_ROWS, SharedPass};
 pub use slots::{Branches, Slots};

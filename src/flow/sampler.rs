@@ -3,6 +3,7 @@
 use super::condition::Condition;
 use super::history::History;
 use super::network::FlowNet;
+use super::shared::Part;
 use super::slots::{Branches, CHUNK, GAZE, NO_GAZE, Slots, UNCONDITIONAL};
 use crate::config::CleanHistory;
 use crate::frame::Sampler;
@@ -28,6 +29,34 @@ pub struct GeneratorOptions {
     pub clean_history: Option<CleanHistory>,
 }
 
+/// The networks that a generator runs, one of them at least.
+#[derive(Debug, Clone, Copy)]
+pub struct Nets<'a> {
+    /// The network of all samplers with steps.
+    pub reference: Option<&'a FlowNet>,
+    /// That of the single-step sampler, and the flow time at which it sees its history.
+    pub student: Option<(&'a FlowNet, f32)>,
+}
+
+impl<'a> Nets<'a> {
+    /// The one that `sampler` runs, if it is there.
+    pub fn of(self, sampler: Sampler) -> Option<&'a FlowNet> {
+        if sampler == Sampler::Single { self.student() } else { self.reference }
+    }
+
+    fn student(self) -> Option<&'a FlowNet> {
+        self.student.map(|(net, _)| net)
+    }
+
+    /// One of them, for what they have in common: sizes.
+    ///
+    /// # Panics
+    /// When there is none.
+    pub fn any(self) -> &'a FlowNet {
+        self.reference.or(self.student()).expect("an engine has a network")
+    }
+}
+
 /// Receives each network evaluation: number of the evaluation, and x1 of each branch, `[branches, latent]`.
 pub type X1Tap<'a> = &'a mut dyn FnMut(usize, &[f32]);
 
@@ -38,13 +67,14 @@ pub type X1Tap<'a> = &'a mut dyn FnMut(usize, &[f32]);
 #[derive(Debug)]
 pub struct Generator {
     history: History,
-    reference: Slots,
+    reference: Option<Slots>,
     student: Option<Slots>,
     taus: Vec<f32>,
+    /// Sampler and guidance of the token being made.
+    making: (Sampler, Guidance),
     z: Vec<f32>,
     start: Vec<f32>,
     x1: Vec<f32>,
-    eps: Vec<f32>,
 }
 
 /// Flow times of the reference sampler, midpoint with four steps; those of the cheaper midpoint rules and of Euler with
@@ -54,36 +84,35 @@ fn eighths() -> Vec<f32> {
 }
 
 impl Generator {
-    /// Takes all memory. `student` pairs the network with the flow time at which it sees its history.
-    pub fn new(
-        exec: &mut Exec,
-        net: &FlowNet,
-        student: Option<(&FlowNet, f32)>,
-        condition: &Condition,
-        options: GeneratorOptions,
-    ) -> Self {
+    /// Takes all memory.
+    ///
+    /// # Panics
+    /// Without any network.
+    pub fn new(exec: &mut Exec, nets: Nets<'_>, condition: &Condition, options: GeneratorOptions) -> Self {
         let mut taus = eighths();
         if let Sampler::Euler(steps) = options.sampler {
             taus.extend((0..steps).map(|i| f32::from(i) / f32::from(steps)).filter(|t| !eighths().contains(t)));
         }
         let pairs: Vec<_> = taus.iter().map(|t| (options.clean_history.map_or(*t, |c| c.time(*t)), *t)).collect();
-        let (latent, window) = (net.latent(), net.config().window_blocks);
+        let any = nets.any();
+        let (latent, window) = (any.latent(), any.config().window_blocks);
         let dtype = options.dtype;
         Self {
             history: History::new(window + CHUNK as usize + 1, latent, condition.layout()),
-            reference: Slots::new(exec, net, &pairs, Branches::Guided, dtype),
-            student: student.map(|(net, tau)| Slots::new(exec, net, &[(tau, 0.0)], Branches::Baked, dtype)),
+            reference: nets.reference.map(|net| Slots::new(exec, net, &pairs, Branches::Guided, dtype)),
+            student: nets.student.map(|(net, tau)| Slots::new(exec, net, &[(tau, 0.0)], Branches::Baked, dtype)),
             taus,
+            making: (options.sampler, Guidance { weight: 1.0, gaze: 0.0 }),
             z: vec![0.0; latent],
             start: vec![0.0; latent],
             x1: vec![0.0; latent],
-            eps: vec![0.0; latent],
         }
     }
 
     /// Whether `sampler` can be used with the slots and networks at hand.
     pub fn supports(&self, sampler: Sampler) -> bool {
         match sampler {
+            Sampler::Midpoint(_) | Sampler::Euler(_) if self.reference.is_none() => false,
             Sampler::Midpoint(n) => matches!(n, 1 | 2 | 4),
             Sampler::Euler(n) => n > 0 && (0..n).all(|i| self.taus.contains(&(f32::from(i) / f32::from(n)))),
             Sampler::Single => self.student.is_some(),
@@ -99,8 +128,7 @@ impl Generator {
     /// Forgets what the caches hold, which is what the network remembers; the tokens stay.
     pub fn forget(&mut self) {
         let next = self.history.len();
-        self.reference.reset(next);
-        self.student.iter_mut().for_each(|slots| slots.reset(next));
+        self.reference.iter_mut().chain(&mut self.student).for_each(|slots| slots.reset(next));
     }
 
     /// The tokens so far.
@@ -113,9 +141,14 @@ impl Generator {
         &mut self.history
     }
 
-    /// Bytes of all caches.
+    /// Takes the memory that tokens with a gaze target need, which the first of them would take otherwise.
+    pub fn open_gaze(&mut self) {
+        self.reference.iter_mut().for_each(Slots::open_gaze);
+    }
+
+    /// Bytes of all caches in use.
     pub fn cache_bytes(&self) -> usize {
-        self.reference.cache_bytes() + self.student.as_ref().map_or(0, Slots::cache_bytes)
+        self.reference.iter().chain(&self.student).map(Slots::cache_bytes).sum()
     }
 
     /// Appends a known latent (standardised) without sampling, for the start of a session. `noise` fills the token's
@@ -127,44 +160,51 @@ impl Generator {
     }
 
     /// Fills every slot with the history so far.
-    pub fn warm_up(&mut self, exec: &mut Exec, net: &FlowNet, student: Option<&FlowNet>) {
-        for slot in 0..self.reference.len() {
-            self.reference.catch_up(exec, net, &self.history, slot);
+    pub fn warm_up(&mut self, exec: &mut Exec, nets: Nets<'_>) {
+        for (slots, net) in [(&mut self.reference, nets.reference), (&mut self.student, nets.student())] {
+            let Some((slots, net)) = slots.as_mut().zip(net) else { continue };
+            (0..slots.len()).for_each(|slot| slots.catch_up(exec, net, &self.history, slot));
         }
-        if let (Some(slots), Some(net)) = (&mut self.student, student) {
-            slots.catch_up(exec, net, &self.history, 0);
+    }
+
+    /// Slots of the reference network.
+    fn references(&self) -> usize {
+        self.reference.as_ref().map_or(0, Slots::len)
+    }
+
+    /// The slots and the network that slot `slot` of all belongs to, and its number there.
+    fn locate<'a, 'n>(
+        reference: &'a mut Option<Slots>,
+        student: &'a mut Option<Slots>,
+        nets: Nets<'n>,
+        slot: usize,
+    ) -> Option<(&'a mut Slots, &'n FlowNet, usize)> {
+        let before = reference.as_ref().map_or(0, Slots::len);
+        match slot.checked_sub(before) {
+            None => Some((reference.as_mut()?, nets.reference?, slot)),
+            Some(slot) => Some((student.as_mut()?, nets.student()?, slot)),
         }
     }
 
     /// Number of slots of both networks, those of the student last.
     pub fn slot_count(&self) -> usize {
-        self.reference.len() + self.student.as_ref().map_or(0, Slots::len)
+        self.references() + self.student.as_ref().map_or(0, Slots::len)
     }
 
     /// Computes a piece of slot `slot` anew from the history, as [`Slots::rewrite`]: tokens from `from` on, none before
     /// `oldest`; returns the token to go on with.
-    pub fn rewrite(
-        &mut self,
-        exec: &mut Exec,
-        net: &FlowNet,
-        student: Option<&FlowNet>,
-        slot: usize,
-        oldest: u64,
-        from: u64,
-    ) -> Option<u64> {
-        if slot < self.reference.len() {
-            return self.reference.rewrite(exec, net, &self.history, slot, oldest, from);
-        }
-        let (slots, net) = self.student.as_mut().zip(student)?;
-        slots.rewrite(exec, net, &self.history, slot - self.reference.len(), oldest, from)
+    pub fn rewrite(&mut self, exec: &mut Exec, nets: Nets<'_>, slot: usize, oldest: u64, from: u64) -> Option<u64> {
+        let (slots, net, slot) = Self::locate(&mut self.reference, &mut self.student, nets, slot)?;
+        slots.rewrite(exec, net, &self.history, slot, oldest, from)
     }
 
     /// Slots that `sampler` visits, in order; empty for one that is not supported.
     pub fn visits(&self, sampler: Sampler) -> impl Iterator<Item = usize> + '_ {
         let (steps, student) = match sampler {
+            Sampler::Midpoint(_) | Sampler::Euler(_) if self.reference.is_none() => (0, None),
             Sampler::Midpoint(n) => (2 * u16::from(n), None),
             Sampler::Euler(n) => (u16::from(n), None),
-            Sampler::Single => (0, self.student.as_ref().map(|_| self.reference.len())),
+            Sampler::Single => (0, self.student.as_ref().map(|_| self.references())),
         };
         let slot = move |i| self.taus.iter().position(|t| *t == f32::from(i) / f32::from(steps));
         (0..steps).filter_map(slot).chain(student)
@@ -172,118 +212,167 @@ impl Generator {
 
     /// Finished tokens that slot `slot` lacks; 1 when it was used for the last token.
     pub fn behind(&self, slot: usize) -> u64 {
-        match slot.checked_sub(self.reference.len()) {
-            None => self.reference.behind(slot, self.history.len()),
-            Some(slot) => self.student.as_ref().map_or(0, |slots| slots.behind(slot, self.history.len())),
-        }
+        let (slots, slot) = match slot.checked_sub(self.references()) {
+            None => (&self.reference, slot),
+            Some(slot) => (&self.student, slot),
+        };
+        slots.as_ref().map_or(0, |slots| slots.behind(slot, self.history.len()))
     }
 
     /// Brings the slot of `sampler` that is furthest behind nearer to the present by one pass.
-    pub fn catch_up(&mut self, exec: &mut Exec, net: &FlowNet, student: Option<&FlowNet>, sampler: Sampler) {
+    pub fn catch_up(&mut self, exec: &mut Exec, nets: Nets<'_>, sampler: Sampler) {
         let Some(slot) = self.visits(sampler).max_by_key(|slot| self.behind(*slot)) else { return };
-        match slot.checked_sub(self.reference.len()) {
-            None => self.reference.catch_up_once(exec, net, &self.history, slot),
-            Some(slot) => {
-                if let Some((slots, net)) = self.student.as_mut().zip(student) {
-                    slots.catch_up_once(exec, net, &self.history, slot);
-                }
-            }
+        if let Some((slots, net, slot)) = Self::locate(&mut self.reference, &mut self.student, nets, slot) {
+            slots.catch_up_once(exec, net, &self.history, slot);
         }
     }
 
     /// Evaluates the network of `sampler` once for the token that would be next and keeps nothing of it: what a step takes
     /// can be measured without making motion.
-    pub fn rehearse(
-        &mut self,
-        exec: &mut Exec,
-        net: &FlowNet,
-        student: Option<&FlowNet>,
-        sampler: Sampler,
-        condition: &Condition,
-    ) {
+    pub fn rehearse(&mut self, exec: &mut Exec, nets: Nets<'_>, sampler: Sampler, condition: &Condition) {
         self.history.begin(condition).fill(0.0);
         self.z.fill(0.0);
-        match (sampler, student, &mut self.student) {
-            (Sampler::Single, Some(net), Some(slots)) => slots.rehearse(exec, net, &self.history, &self.z),
-            _ => self.reference.rehearse(exec, net, &self.history, &self.z),
+        let slots = if sampler == Sampler::Single { &mut self.student } else { &mut self.reference };
+        if let Some((slots, net)) = slots.as_mut().zip(nets.of(sampler)) {
+            slots.rehearse(exec, net, &self.history, &self.z);
         }
     }
 
     /// Samples the latent of the next token, standardised, and appends it to the history.
     ///
-    /// `noise` fills the token's noise, given its index. A sampler that is not supported falls back to the reference
-    /// network's midpoint rule; sessions refuse such samplers before.
+    /// `noise` fills the token's noise, given its index. A sampler that is not supported falls back to the midpoint rule, or
+    /// without the reference network to a single step; sessions refuse such samplers before.
     #[allow(clippy::too_many_arguments, reason = "one call a block; a struct would only rename the arguments")]
     pub fn sample(
         &mut self,
         exec: &mut Exec,
-        net: &FlowNet,
-        student: Option<&FlowNet>,
+        nets: Nets<'_>,
         sampler: Sampler,
         guidance: Guidance,
         condition: &Condition,
         noise: impl FnOnce(u64, &mut [f32]),
         mut tap: Option<X1Tap<'_>>,
     ) -> &[f32] {
+        self.begin(sampler, guidance, condition, noise);
+        for i in 0..self.evaluations() {
+            let slot = self.slot(i);
+            let slots = if self.is_single() { &mut self.student } else { &mut self.reference };
+            let Some((slots, net)) = slots.as_mut().zip(nets.of(self.making.0)) else { continue };
+            let x1 = slots.evaluate(exec, net, &self.history, slot, &self.z);
+            if let Some(tap) = &mut tap {
+                tap(i, x1);
+            }
+            self.step(i);
+        }
+        self.finish()
+    }
+
+    /// Starts making the next token from its noise.
+    pub(super) fn begin(
+        &mut self,
+        sampler: Sampler,
+        guidance: Guidance,
+        condition: &Condition,
+        noise: impl FnOnce(u64, &mut [f32]),
+    ) {
         let token = self.history.len();
         noise(token, self.history.begin(condition));
-        self.eps.copy_from_slice(self.history.eps(token));
-        self.z.copy_from_slice(&self.eps);
-        match (sampler, student) {
-            (Sampler::Single, Some(net)) => self.single(exec, net, &mut tap),
-            (Sampler::Euler(steps), _) => self.euler(exec, net, usize::from(steps), guidance, &mut tap),
-            (Sampler::Midpoint(steps), _) => self.midpoint(exec, net, usize::from(steps), guidance, &mut tap),
-            (Sampler::Single, None) => self.midpoint(exec, net, 4, guidance, &mut tap),
-        }
-        self.history.finish(&self.z);
-        &self.z
+        self.z.copy_from_slice(self.history.eps(token));
+        let other = if self.reference.is_some() { Sampler::Midpoint(4) } else { Sampler::Single };
+        let sampler = if self.supports(sampler) { sampler } else { other };
+        self.making = (sampler, guidance);
     }
 
-    /// `z_mid = z + h/2 v(z, tau)`, `z += h v(z_mid, tau + h/2)` with `h = 1 / steps`.
-    fn midpoint(&mut self, exec: &mut Exec, net: &FlowNet, steps: usize, g: Guidance, tap: &mut Option<X1Tap<'_>>) {
-        let h = 1.0 / steps as f32;
-        for i in 0..steps {
-            let tau = i as f32 * h;
-            self.start.copy_from_slice(&self.z);
-            self.guided(exec, net, 2 * i, tau, g, tap);
-            advance(&mut self.z, &self.start, &self.x1, 0.5 * h, tau);
-            self.guided(exec, net, 2 * i + 1, tau + 0.5 * h, g, tap);
-            advance(&mut self.z, &self.start, &self.x1, h, tau + 0.5 * h);
-        }
+    /// Evaluations of the network that the token being made takes.
+    pub(super) fn evaluations(&self) -> usize {
+        self.making.0.evaluations()
     }
 
-    /// `z += v(z, tau) / steps`.
-    fn euler(&mut self, exec: &mut Exec, net: &FlowNet, steps: usize, g: Guidance, tap: &mut Option<X1Tap<'_>>) {
-        for i in 0..steps {
-            let tau = i as f32 / steps as f32;
-            self.guided(exec, net, i, tau, g, tap);
-            self.start.copy_from_slice(&self.z);
-            advance(&mut self.z, &self.start, &self.x1, 1.0 / steps as f32, tau);
-        }
+    /// What makes the token.
+    pub(super) fn sampler(&self) -> Sampler {
+        self.making.0
     }
 
-    fn single(&mut self, exec: &mut Exec, net: &FlowNet, tap: &mut Option<X1Tap<'_>>) {
-        if let Some(slots) = &mut self.student {
-            let x1 = slots.evaluate(exec, net, &self.history, 0, &self.z);
-            if let Some(tap) = tap {
-                tap(0, x1);
+    /// Whether the student makes the token.
+    fn is_single(&self) -> bool {
+        self.making.0 == Sampler::Single
+    }
+
+    /// Flow time of evaluation `i` and length of a step.
+    fn time(&self, i: usize) -> (f32, f32) {
+        match self.making.0 {
+            Sampler::Midpoint(steps) => {
+                let h = 1.0 / f32::from(steps);
+                let tau = (i / 2) as f32 * h;
+                (if i.is_multiple_of(2) { tau } else { tau + 0.5 * h }, h)
             }
-            self.z.copy_from_slice(x1);
+            Sampler::Euler(steps) => (i as f32 / f32::from(steps), 1.0 / f32::from(steps)),
+            Sampler::Single => (0.0, 1.0),
         }
     }
 
-    /// Evaluates the network at `self.z` and leaves the guided x1 in `self.x1`.
-    fn guided(&mut self, exec: &mut Exec, net: &FlowNet, n: usize, tau: f32, g: Guidance, tap: &mut Option<X1Tap<'_>>) {
-        let slot = self.taus.iter().position(|t| *t == tau).unwrap_or(0);
-        let x1 = self.reference.evaluate(exec, net, &self.history, slot, &self.z);
-        if let Some(tap) = tap {
-            tap(n, x1);
+    /// Slot of evaluation `i` within its network's.
+    pub(super) fn slot(&self, i: usize) -> usize {
+        if self.is_single() {
+            return 0;
         }
+        let (tau, _) = self.time(i);
+        self.taus.iter().position(|t| *t == tau).unwrap_or(0)
+    }
+
+    /// Goes on with what evaluation `i` predicted.
+    ///
+    /// Midpoint: `z_mid = z + h/2 v(z, tau)`, `z += h v(z_mid, tau + h/2)` with `h = 1 / steps`. Euler: `z += v(z, tau) / steps`.
+    pub(super) fn step(&mut self, i: usize) {
+        if let (Sampler::Single, Some(slots)) = (self.making.0, &self.student) {
+            return self.z.copy_from_slice(slots.x1());
+        }
+        let Some(slots) = &self.reference else { return };
+        let (x1, g) = (slots.x1(), self.making.1);
         let latent = self.x1.len();
         let branch = |b: usize| &x1[b * latent..][..latent];
         let (x0, xc, xg) = (branch(UNCONDITIONAL), branch(NO_GAZE), branch(GAZE));
         for (((x, x0), xc), xg) in self.x1.iter_mut().zip(x0).zip(xc).zip(xg) {
             *x = x0 + g.weight * (xc - x0) + g.gaze * (xg - xc);
+        }
+        let (tau, h) = self.time(i);
+        let midpoint = matches!(self.making.0, Sampler::Midpoint(_));
+        if !midpoint || i.is_multiple_of(2) {
+            self.start.copy_from_slice(&self.z);
+        }
+        let h = if midpoint && i.is_multiple_of(2) { 0.5 * h } else { h };
+        advance(&mut self.z, &self.start, &self.x1, h, tau);
+    }
+
+    /// Appends the token to the history.
+    pub(super) fn finish(&mut self) -> &[f32] {
+        self.history.finish(&self.z);
+        &self.z
+    }
+
+    /// This generator's part in a shared pass.
+    pub(super) fn part(&mut self) -> Option<Part<'_>> {
+        let slots = if self.is_single() { &mut self.student } else { &mut self.reference };
+        Some(Part { slots: slots.as_mut()?, history: &self.history, z: &self.z })
+    }
+
+    /// Rows of one evaluation of `sampler` for the next token, with or without a gaze target; `None` where slots must catch up first
+    /// or the sampler is not supported.
+    pub fn rows(&self, sampler: Sampler, gaze: bool) -> Option<usize> {
+        if !self.supports(sampler) || self.visits(sampler).any(|slot| self.behind(slot) > 1) {
+            return None;
+        }
+        let last = self.history.len().checked_sub(1).filter(|_| !self.history.is_empty());
+        let gaze = gaze || last.is_some_and(|token| self.history.condition(token).has_gaze());
+        Some(2 * if sampler == Sampler::Single { 1 } else { 2 + usize::from(gaze) })
+    }
+
+    /// Whether rows of `sampler` of both can share passes: slots at the same flow times.
+    pub fn alike(&self, other: &Generator, sampler: Sampler) -> bool {
+        match (sampler, &self.student, &other.student, &self.reference, &other.reference) {
+            (Sampler::Single, Some(a), Some(b), ..) => a.alike(b),
+            (_, _, _, Some(a), Some(b)) => a.alike(b) && self.taus == other.taus,
+            _ => false,
         }
     }
 }

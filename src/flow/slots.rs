@@ -1,6 +1,7 @@
 //! One key-value cache a flow time, and the passes that fill and use them.
 //!
-//! Rings are numbered `(slot * branches + branch) * layers + layer`. Position `t` of a ring holds token `t`. A pass
+//! Rings are numbered `(slot * branches + branch) * layers + layer`; those of the gaze branch come after all others, and are not
+//! touched, hence take no memory, before there is a gaze target: until then the branch is the one without. Position `t` of a ring holds token `t`. A pass
 //! writes the new token's keys and values too; they are provisional, and the next pass over that position, when the
 //! token is finished, overwrites them.
 
@@ -9,6 +10,7 @@ use super::network::{FlowNet, Modulation};
 use crate::kernels::{Epilogue, Exec, KvCache, KvDtype};
 use crate::nn::{Phases, Rows, Scratch};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Finished tokens that one pass commits at most.
 pub(super) const CHUNK: u64 = 8;
@@ -52,8 +54,10 @@ struct Slot {
 pub struct Slots {
     branches: Branches,
     slots: Vec<Slot>,
-    modulation: Modulation,
+    modulation: Arc<Modulation>,
     cache: KvCache,
+    /// Whether the gaze branch has rings of its own.
+    gaze: bool,
     layers: usize,
     window: u64,
     /// Projected conditioning of the last tokens, `[token % capacity][2][d]`.
@@ -83,8 +87,9 @@ impl Slots {
         Self {
             branches,
             slots: taus.iter().map(|(h, _)| Slot { tau_history: *h, committed: 0, start: 0 }).collect(),
-            modulation: net.modulation(exec, &all),
+            modulation: Arc::new(net.modulation(exec, &all)),
             cache: KvCache::new(taus.len() * branches.count() * c.layers, capacity as usize, d, dtype),
+            gaze: false,
             layers: c.layers,
             window,
             projected: vec![0.0; (capacity as usize + 1) * 2 * d],
@@ -109,9 +114,19 @@ impl Slots {
         self.slots.iter_mut().for_each(|s| (s.committed, s.start) = (next, next));
     }
 
-    /// Bytes of the caches.
+    /// Whether rows of the same slots of `self` and `other` can go through the layers together: modulation is the same.
+    pub(super) fn alike(&self, other: &Slots) -> bool {
+        let same = |(a, b): (&Slot, &Slot)| a.tau_history.to_bits() == b.tau_history.to_bits();
+        let paired = self.slots.len() == other.slots.len() && self.slots.iter().zip(&other.slots).all(same);
+        paired && self.branches == other.branches
+    }
+
+    /// Bytes of the caches that are in use.
     pub fn cache_bytes(&self) -> usize {
-        self.cache.bytes()
+        match self.branches {
+            Branches::Guided if !self.gaze => self.cache.bytes() / 3 * 2,
+            _ => self.cache.bytes(),
+        }
     }
 
     /// Number of slots.
@@ -186,6 +201,70 @@ impl Slots {
         &self.x1
     }
 
+    /// Stages an evaluation at `z` of a slot that lacks one token at most; returns the number of rows.
+    pub(super) fn stage_next(
+        &mut self,
+        exec: &mut Exec,
+        net: &FlowNet,
+        history: &History,
+        slot: usize,
+        z: &[f32],
+    ) -> usize {
+        let end = history.len();
+        self.pending(slot, end);
+        let first = self.slots[slot].committed;
+        self.stage(exec, net, history, slot, first..end, Some(z));
+        self.rows.len()
+    }
+
+    /// Copies the staged rows, and the number of the modulation of each.
+    pub(super) fn hand_over(&self, rows: usize, d: usize, x: &mut [f32], index: &mut Vec<u32>) {
+        x[..rows * d].copy_from_slice(&self.x[..rows * d]);
+        index.extend_from_slice(&self.mod_index);
+    }
+
+    pub(super) fn phases(&self) -> &Phases {
+        &self.phases
+    }
+
+    pub(super) fn modulation(&self) -> Arc<Modulation> {
+        Arc::clone(&self.modulation)
+    }
+
+    /// The attention of the staged rows in layer `layer`; returns their number.
+    pub(super) fn attend(
+        &mut self,
+        exec: &mut Exec,
+        layer: usize,
+        heads: usize,
+        qkv: &[f32],
+        out: &mut [f32],
+    ) -> usize {
+        let (n, d) = (self.rows.len(), self.cache.dim());
+        self.rows.attend(exec, layer, heads, &mut self.cache, &qkv[..n * 3 * d], &mut out[..n * d]);
+        n
+    }
+
+    /// Takes the staged rows as they came out of the last layer; returns their number. The prediction is in [`Slots::x1`].
+    pub(super) fn take_back(
+        &mut self,
+        exec: &mut Exec,
+        net: &FlowNet,
+        history: &History,
+        slot: usize,
+        x: &[f32],
+    ) -> usize {
+        let (n, d) = (self.rows.len(), net.config().width);
+        self.x[..n * d].copy_from_slice(&x[..n * d]);
+        self.finish(exec, net, history, slot, self.slots[slot].committed..history.len(), true);
+        n
+    }
+
+    /// Prediction of the last evaluation, `[branches, latent]`.
+    pub(super) fn x1(&self) -> &[f32] {
+        &self.x1
+    }
+
     /// Evaluates slot 0 for the new token and forgets it again.
     pub fn rehearse(&mut self, exec: &mut Exec, net: &FlowNet, history: &History, z: &[f32]) {
         self.evaluate(exec, net, history, 0, z);
@@ -213,6 +292,28 @@ impl Slots {
         commit: Range<u64>,
         new: Option<&[f32]>,
     ) {
+        self.stage(exec, net, history, slot, commit.clone(), new);
+        let (heads, n) = (net.config().heads, self.rows.len());
+        let Self { modulation, mod_index, cache, rows, phases, scratch, x, .. } = &mut *self;
+        for (i, layer) in net.layers.iter().enumerate() {
+            let norms = modulation.layer(i, mod_index);
+            layer.run(exec, heads, norms, phases, n, scratch, x, &mut |exec, qkv, out| {
+                rows.attend(exec, i, heads, cache, qkv, out);
+            });
+        }
+        self.finish(exec, net, history, slot, commit, new.is_some());
+    }
+
+    /// Fills the rows of a pass: what [`Slots::pass`] runs through the layers.
+    fn stage(
+        &mut self,
+        exec: &mut Exec,
+        net: &FlowNet,
+        history: &History,
+        slot: usize,
+        commit: Range<u64>,
+        new: Option<&[f32]>,
+    ) {
         let (d, latent) = (net.config().width, net.latent());
         let tau = self.slots[slot].tau_history;
         let tokens = commit.start..commit.end + u64::from(new.is_some());
@@ -230,6 +331,9 @@ impl Slots {
         self.rows.clear();
         self.mod_index.clear();
         let start = self.slots[slot].start;
+        if tokens.clone().any(|token| history.condition(token).has_gaze()) {
+            self.open_gaze();
+        }
         for token in tokens.clone() {
             let is_new = token == commit.end;
             for branch in self.active(history, token) {
@@ -249,18 +353,23 @@ impl Slots {
                 x.iter_mut().zip(z_in).zip(conditioning).for_each(|((x, a), b)| *x = a + b);
             }
         }
+    }
 
-        for (i, layer) in net.layers.iter().enumerate() {
-            let norms = self.modulation.layer(i, &self.mod_index);
-            let heads = net.config().heads;
-            let (cache, rows) = (&mut self.cache, &mut self.rows);
-            layer.run(exec, i, heads, norms, &self.phases, cache, rows, &mut self.scratch, &mut self.x);
-        }
-        for token in tokens {
+    /// What follows the layers of a pass.
+    fn finish(
+        &mut self,
+        exec: &mut Exec,
+        net: &FlowNet,
+        history: &History,
+        slot: usize,
+        commit: Range<u64>,
+        new: bool,
+    ) {
+        for token in commit.start..commit.end + u64::from(new) {
             self.mirror_gaze_branch(history, slot, token);
         }
         self.slots[slot].committed = commit.end;
-        if new.is_some() {
+        if new {
             self.read_out(exec, net, history.condition(commit.end).has_gaze());
         }
     }
@@ -276,7 +385,7 @@ impl Slots {
 
     /// A token without a gaze target is the same in both conditional branches: copies its keys and values.
     fn mirror_gaze_branch(&mut self, history: &History, slot: usize, token: u64) {
-        if self.branches == Branches::Guided && !history.condition(token).has_gaze() {
+        if self.gaze && !history.condition(token).has_gaze() {
             let (from, to) = (self.ring(slot, NO_GAZE), self.ring(slot, GAZE));
             (0..self.layers).for_each(|layer| self.cache.copy_token(from + layer, to + layer, token));
         }
@@ -310,7 +419,25 @@ impl Slots {
     }
 
     fn ring(&self, slot: usize, branch: usize) -> usize {
-        (slot * self.branches.count() + branch) * self.layers
+        let (slots, count) = (self.slots.len(), self.branches.count());
+        let number = match (self.branches, branch) {
+            (Branches::Guided, GAZE) => slots * (count - 1) + slot,
+            (Branches::Guided, _) => slot * (count - 1) + branch,
+            (Branches::Baked, _) => slot,
+        };
+        number * self.layers
+    }
+
+    /// Gives the gaze branch rings of its own, with what the branch without a target holds.
+    pub(super) fn open_gaze(&mut self) {
+        if self.gaze || self.branches == Branches::Baked {
+            return;
+        }
+        self.gaze = true;
+        for slot in 0..self.slots.len() {
+            let (from, to) = (self.ring(slot, NO_GAZE), self.ring(slot, GAZE));
+            (0..self.layers).for_each(|layer| self.cache.copy_ring(from + layer, to + layer));
+        }
     }
 }
 

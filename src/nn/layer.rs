@@ -82,10 +82,24 @@ impl Rows {
         &self.positions
     }
 
-    fn select_layer(&mut self, layer: usize) {
-        for (span, base) in self.spans.iter_mut().zip(&self.base) {
+    /// Writes the rows' keys and values of layer `layer` to `cache`, then attends over each row's span: `qkv` is `rows x 3d`, `out`
+    /// `rows x d`.
+    pub fn attend(
+        &mut self,
+        exec: &mut Exec,
+        layer: usize,
+        heads: usize,
+        cache: &mut KvCache,
+        qkv: &[f32],
+        out: &mut [f32],
+    ) {
+        let d = cache.dim();
+        let base = self.base.iter().zip(&self.positions).zip(qkv.chunks_exact(3 * d));
+        for (span, ((base, position), row)) in self.spans.iter_mut().zip(base) {
             span.ring = base + layer as u32;
+            cache.write(span.ring as usize, *position, &row[d..2 * d], &row[2 * d..]);
         }
+        exec.attend(qkv, 3 * d, heads, cache, &self.spans, out);
     }
 }
 
@@ -104,42 +118,39 @@ impl Scratch {
     }
 }
 
+/// The attention of a pass: gets queries, keys and values, `rows x 3d`, and fills what each row attends to, `rows x d`.
+pub type Attention<'a> = dyn FnMut(&mut Exec, &[f32], &mut [f32]) + 'a;
+
 impl Layer {
     /// Bytes of the packed matrices.
     pub fn bytes(&self) -> usize {
         [&self.qkv, &self.proj, &self.fc1, &self.fc2].into_iter().map(Matrix::bytes).sum()
     }
 
-    /// Runs layer number `index` over `x` (`rows x d`, in place): writes the rows' keys and values to `cache`, then
-    /// attends over each row's span.
+    /// Runs the layer over `x` (`n x d`, in place). `attention` is [`Rows::attend`] of each of the caches that the rows belong to.
     #[allow(clippy::too_many_arguments, reason = "a layer's pass needs all of them, and they have no natural owner")]
     pub fn run(
         &self,
         exec: &mut Exec,
-        index: usize,
         heads: usize,
         norms: LayerNorms<'_>,
         phases: &Phases,
-        cache: &mut KvCache,
-        rows: &mut Rows,
+        n: usize,
         scratch: &mut Scratch,
         x: &mut [f32],
+        attention: &mut Attention<'_>,
     ) {
-        let (n, d) = (rows.len(), self.proj.out_features());
+        let d = self.proj.out_features();
         let x = &mut x[..n * d];
         let normed = &mut scratch.normed[..n * d];
         let qkv = &mut scratch.qkv[..n * 3 * d];
         let hidden = &mut scratch.hidden[..n * self.fc1.out_features()];
-        rows.select_layer(index);
 
         exec.norm(x, n, d, norms.norm1.0, norms.norm1.1, normed);
         exec.linear(&self.qkv, normed, n, qkv, Epilogue::Store);
         let half = n * d / heads / 2;
         exec.rope(qkv, n, 3 * d, 2 * heads, d / heads, &phases.cos[..half], &phases.sin[..half]);
-        for ((span, position), row) in rows.spans.iter().zip(&rows.positions).zip(qkv.chunks_exact(3 * d)) {
-            cache.write(span.ring as usize, *position, &row[d..2 * d], &row[2 * d..]);
-        }
-        exec.attend(qkv, 3 * d, heads, cache, &rows.spans, normed);
+        attention(exec, qkv, normed);
         exec.linear(&self.proj, normed, n, x, gated(norms.gate1));
 
         exec.norm(x, n, d, norms.norm2.0, norms.norm2.1, normed);

@@ -152,13 +152,13 @@ impl<'e> Teacher<'e> {
     fn through(&self, engine: &Engine, activations: &mut Option<Activations>) -> Result<Vec<Vec<f32>>> {
         let mut exec = engine.exec(1)?;
         exec.listen(activations.take());
-        let (mut encoder, mut decoder) = (engine.encoder.state(KvDtype::F16), engine.decoder.state(KvDtype::F16));
+        let (mut encoder, mut decoder) = (engine.encoder()?.state(KvDtype::F16), engine.decoder.state(KvDtype::F16));
         let mut z = vec![0.0; engine.config().vae.latent];
         let mut out = Vec::with_capacity(self.steps.len());
         exec.begin();
         for step in &self.steps {
             let mut x = vec![0.0; step.features.len()];
-            engine.encoder.step(&mut exec, &mut encoder, &step.features, &mut z);
+            engine.encoder()?.step(&mut exec, &mut encoder, &step.features, &mut z);
             engine.decoder.step(&mut exec, &mut decoder, &z, &mut x);
             engine.pose.restore(&mut x);
             out.push(x);

@@ -41,10 +41,9 @@ impl<'e> Walker<'e> {
         let c = engine.config();
         let mut exec = engine.exec(1)?;
         exec.listen(activations);
-        let student = engine.student.as_ref().zip(c.student.map(|s| s.tau_history));
         let condition = Condition::absent(engine.layout());
         let options = GeneratorOptions { sampler, dtype: KvDtype::F16, clean_history: c.session.clean_history };
-        let generator = Generator::new(&mut exec, &engine.flow, student, &condition, options);
+        let generator = Generator::new(&mut exec, engine.nets(), &condition, options);
         let mut this = Self {
             generator,
             sampler,
@@ -67,7 +66,7 @@ impl<'e> Walker<'e> {
             this.generator.append(&this.condition, z, |token, eps| noise(seed, temperature, token, eps));
             this.decode(z);
         }
-        this.generator.warm_up(&mut this.exec, &engine.flow, engine.student.as_ref());
+        this.generator.warm_up(&mut this.exec, engine.nets());
         this.exec.end();
         Ok(this)
     }
@@ -94,10 +93,9 @@ impl<'e> Walker<'e> {
         }
         let (seed, temperature) = (self.seed, c.session.temperature);
         let guidance = Guidance { weight: c.session.guidance, gaze: c.session.gaze_guidance };
-        let (exec, student) = (&mut self.exec, engine.student.as_ref());
+        let (exec, nets) = (&mut self.exec, engine.nets());
         let noise = |token, eps: &mut [f32]| noise(seed, temperature, token, eps);
-        let z =
-            self.generator.sample(exec, &engine.flow, student, self.sampler, guidance, &self.condition, noise, None);
+        let z = self.generator.sample(exec, nets, self.sampler, guidance, &self.condition, noise, None);
         self.z.copy_from_slice(z);
         let z = std::mem::take(&mut self.z);
         self.decode(&z);

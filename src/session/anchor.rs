@@ -62,7 +62,7 @@ pub(super) struct Anchor {
     /// Asked for before it is due.
     requested: bool,
     anchor: Root,
-    encoder: EncoderState,
+    encoder: Option<EncoderState>,
     /// The decoder that takes over.
     next: DecoderState,
     capacity: u64,
@@ -79,11 +79,13 @@ pub(super) struct Anchor {
 impl Anchor {
     pub(super) fn new(engine: &Engine, options: &SessionOptions) -> Self {
         let period = match options.anchoring {
+            _ if engine.encoder.is_none() => 0,
             Anchoring::Bundle => engine.config.session.anchor_period,
             Anchoring::Never => 0,
             Anchoring::Every(blocks) => blocks,
         };
-        let capacity = engine.config.flow.window_blocks as u64 + 1;
+        // Without re-anchoring nobody looks back.
+        let capacity = if period == 0 { 1 } else { engine.config.flow.window_blocks as u64 + 1 };
         let (width, latent) = (BLOCK_FRAMES * engine.features(), engine.config.vae.latent);
         Self {
             period: u64::from(period),
@@ -95,7 +97,7 @@ impl Anchor {
             anchored_at: 0,
             requested: false,
             anchor: options.start,
-            encoder: engine.encoder.state(options.cache),
+            encoder: engine.encoder.as_ref().map(|encoder| encoder.state(options.cache)),
             next: engine.decoder.state(options.cache),
             capacity,
             features: vec![0.0; capacity as usize * width],
@@ -144,7 +146,7 @@ impl Anchor {
     }
 
     pub(super) fn cache_bytes(&self) -> usize {
-        self.encoder.cache_bytes() + self.next.cache_bytes()
+        self.encoder.as_ref().map_or(0, EncoderState::cache_bytes) + self.next.cache_bytes()
     }
 
     /// Remembers the decoded features (standardised) of a block.
@@ -198,8 +200,7 @@ impl Anchor {
                     if slot >= generator.slot_count() {
                         break;
                     }
-                    let student = engine.student.as_ref();
-                    match generator.rewrite(exec, &engine.flow, student, slot, self.started, from) {
+                    match generator.rewrite(exec, engine.nets(), slot, self.started, from) {
                         Some(next) => from = next,
                         None => (slot, from) = (slot + 1, self.started),
                     }
@@ -238,7 +239,7 @@ impl Anchor {
         if far || self.requested || self.blocks >= self.anchored_at + self.period {
             self.requested = false;
             self.started = self.blocks.saturating_sub(self.capacity - 1).max(self.first);
-            self.encoder.reset(self.started);
+            self.encoder.iter_mut().for_each(|encoder| encoder.reset(self.started));
             self.phase = Phase::Encode(self.started);
         }
     }
@@ -247,7 +248,9 @@ impl Anchor {
         let slot = self.slot(block);
         let features = &self.features[slot * self.width..][..self.width];
         let latent = &mut self.latents[slot * self.latent..][..self.latent];
-        engine.encoder.step(exec, &mut self.encoder, features, latent);
+        if let Some((encoder, state)) = engine.encoder.as_ref().zip(self.encoder.as_mut()) {
+            encoder.step(exec, state, features, latent);
+        }
     }
 
     fn slot(&self, block: u64) -> usize {

@@ -7,7 +7,7 @@ use super::inputs::Inputs;
 use super::probe::{Probe, tell};
 use crate::engine::Engine;
 use crate::error::Result;
-use crate::flow::{Condition, Generator, GeneratorOptions, normal};
+use crate::flow::{Condition, Generator, GeneratorOptions, SharedPass, normal};
 use crate::frame::{BLOCK_FRAMES, FPS, Frame, Sampler};
 use crate::kernels::Exec;
 use crate::pose::{self, gaze_score};
@@ -27,9 +27,8 @@ pub(super) enum Noise {
 
 /// All that changes from block to block.
 pub(super) struct BlockState {
-    exec: Exec,
     pub(super) inputs: Inputs,
-    generator: Generator,
+    pub(super) generator: Generator,
     decoder: DecoderState,
     pub(super) anchor: Anchor,
     pub(super) motion: pose::Decoder,
@@ -46,10 +45,7 @@ pub(super) struct BlockState {
 }
 
 impl BlockState {
-    pub(super) fn new(engine: &Engine, options: &SessionOptions) -> Result<Self> {
-        let mut exec = engine.exec(options.threads)?;
-        options.core_mask.map_or(Ok(()), |mask| exec.pool().pin_helper(mask))?;
-        let student = engine.student.as_ref().zip(engine.config.student.map(|s| s.tau_history));
+    pub(super) fn new(exec: &mut Exec, engine: &Engine, options: &SessionOptions) -> Result<Self> {
         let generator_options = GeneratorOptions {
             sampler: options.sampler,
             dtype: options.cache,
@@ -57,7 +53,10 @@ impl BlockState {
         };
         let condition = Condition::absent(engine.layout());
         exec.begin();
-        let generator = Generator::new(&mut exec, &engine.flow, student, &condition, generator_options);
+        let mut generator = Generator::new(exec, engine.nets(), &condition, generator_options);
+        if options.gaze.is_some() {
+            generator.open_gaze();
+        }
         exec.end();
         let rig = &engine.config.rig;
         let mut motion = pose::Decoder::new(engine.kernels, rig, engine.config.pose.radius);
@@ -83,14 +82,13 @@ impl BlockState {
             features: vec![0.0; BLOCK_FRAMES * engine.features()],
             frames: (0..BLOCK_FRAMES).map(|_| Frame::empty(rig.joints.len())).collect(),
             block: 0,
-            exec,
         };
-        state.reset(engine, options)?;
+        state.reset(exec, engine, options)?;
         Ok(state)
     }
 
     /// Back to the start: the idle clip as history, the agent where the options put it.
-    pub(super) fn reset(&mut self, engine: &Engine, options: &SessionOptions) -> Result<()> {
+    pub(super) fn reset(&mut self, exec: &mut Exec, engine: &Engine, options: &SessionOptions) -> Result<()> {
         self.block = options.first_block;
         self.inputs.reset(self.block);
         self.generator.reset(self.block);
@@ -99,17 +97,17 @@ impl BlockState {
         self.motion.reset(options.start);
         let temperature = options.temperature(engine);
         let absent = &self.inputs.condition;
-        self.exec.begin();
+        exec.begin();
         for z in engine.idle.chunks_exact(engine.config.vae.latent) {
             let noise = &self.noise;
             self.generator.append(absent, z, |token, eps| noise.fill(options, temperature, token, eps));
             self.latent.copy_from_slice(z);
             engine.latent.restore(&mut self.latent);
-            engine.decoder.step(&mut self.exec, &mut self.decoder, &self.latent, &mut self.features);
+            engine.decoder.step(exec, &mut self.decoder, &self.latent, &mut self.features);
             self.anchor.remember(&self.features);
         }
-        self.generator.warm_up(&mut self.exec, &engine.flow, engine.student.as_ref());
-        self.exec.end();
+        self.generator.warm_up(exec, engine.nets());
+        exec.end();
         if !engine.idle.is_empty() {
             engine.pose.restore(&mut self.features);
             let width = engine.features();
@@ -122,22 +120,8 @@ impl BlockState {
         self.generator.supports(sampler)
     }
 
-    pub(super) fn helper_thread_id(&self) -> Option<u32> {
-        self.exec.pool().helper_id()
-    }
-
     pub(super) fn cache_bytes(&self) -> usize {
         self.generator.cache_bytes() + self.decoder.cache_bytes() + self.anchor.cache_bytes()
-    }
-
-    /// Wakes the second thread and sets the floating-point mode; system calls belong here.
-    pub(super) fn begin(&mut self) {
-        self.exec.begin();
-    }
-
-    /// Undoes [`BlockState::begin`].
-    pub(super) fn end(&mut self) {
-        self.exec.end();
     }
 
     /// What the next block would cost on each of `ladder`, best first.
@@ -160,16 +144,25 @@ impl BlockState {
     #[cfg_attr(visavis_rtsan, sanitize(realtime = "nonblocking"))]
     pub(super) fn compute(
         &mut self,
+        exec: &mut Exec,
         engine: &Engine,
         options: &SessionOptions,
         plan: &Plan,
         mut probe: Option<&mut dyn Probe>,
     ) -> Result<()> {
         if plan.hold == Hold::No {
-            self.generate(engine, options, plan, &mut probe)?;
+            self.prepare(exec, engine, options, &mut probe)?;
+            self.sample(exec, engine, options, plan, &mut probe);
+            self.complete(exec, engine, options, plan, &mut probe)?;
         } else {
-            self.hold(engine, plan)?;
+            self.hold(exec, engine, plan)?;
         }
+        self.present(engine, plan, &mut probe);
+        Ok(())
+    }
+
+    /// Labels the frames; the block is done.
+    pub(super) fn present(&mut self, engine: &Engine, plan: &Plan, probe: &mut Option<&mut dyn Probe>) {
         for (i, frame) in self.frames.iter_mut().enumerate() {
             frame.index = self.block * BLOCK_FRAMES as u64 + i as u64;
             frame.time = frame.index as f64 / f64::from(FPS);
@@ -177,57 +170,85 @@ impl BlockState {
             let head = &frame.global[self.head];
             frame.gaze = self.inputs.head_at(frame.index).and_then(|user| gaze_score(&engine.config.rig, head, user));
         }
-        tell_frames(&mut probe, self.block, &self.frames);
+        tell_frames(probe, self.block, &self.frames);
         self.block += 1;
-        Ok(())
     }
 
-    fn hold(&mut self, engine: &Engine, plan: &Plan) -> Result<()> {
+    fn hold(&mut self, exec: &mut Exec, engine: &Engine, plan: &Plan) -> Result<()> {
         self.inputs.skip(self.block)?;
         if plan.hold == Hold::Rehearse {
             self.inputs.condition.clear();
-            let (student, condition) = (engine.student.as_ref(), &self.inputs.condition);
-            self.generator.rehearse(&mut self.exec, &engine.flow, student, plan.sampler, condition);
+            self.generator.rehearse(exec, engine.nets(), plan.sampler, &self.inputs.condition);
         }
         self.motion.hold_block(&mut self.frames);
         Ok(())
     }
 
-    fn generate(
+    /// Makes the conditioning of the next block.
+    pub(super) fn prepare(
         &mut self,
+        exec: &mut Exec,
+        engine: &Engine,
+        options: &SessionOptions,
+        probe: &mut Option<&mut dyn Probe>,
+    ) -> Result<()> {
+        self.inputs.prepare(exec, engine, self.block, &self.motion.root(), options.gaze, probe)
+    }
+
+    /// Makes the latent.
+    fn sample(
+        &mut self,
+        exec: &mut Exec,
         engine: &Engine,
         options: &SessionOptions,
         plan: &Plan,
         probe: &mut Option<&mut dyn Probe>,
-    ) -> Result<()> {
-        let (block, root) = (self.block, self.motion.root());
-        self.inputs.prepare(&mut self.exec, engine, block, &root, options.gaze, probe)?;
-
-        let (student, noise, temperature) = (engine.student.as_ref(), &self.noise, options.temperature(engine));
+    ) {
+        let (block, noise, temperature) = (self.block, &self.noise, options.temperature(engine));
         let mut tap = probe.as_mut().map(|p| |_: usize, x1: &[f32]| p.stage(block, "x1", x1));
-        let z = self.generator.sample(
-            &mut self.exec,
-            &engine.flow,
-            student,
+        self.generator.sample(
+            exec,
+            engine.nets(),
             plan.sampler,
             options.guidance(engine),
             &self.inputs.condition,
             |token, eps| noise.fill(options, temperature, token, eps),
             tap.as_mut().map(|tap| tap as _),
         );
-        self.latent.copy_from_slice(z);
+    }
+
+    /// Begins the latent, for [`SharedPass::sample`] to make.
+    pub(super) fn begin_shared(&mut self, engine: &Engine, options: &SessionOptions, plan: &Plan) {
+        let (noise, temperature) = (&self.noise, options.temperature(engine));
+        let (guidance, condition) = (options.guidance(engine), &self.inputs.condition);
+        SharedPass::begin(&mut self.generator, plan.sampler, guidance, condition, |token, eps| {
+            noise.fill(options, temperature, token, eps);
+        });
+    }
+
+    /// Makes frames of the latent that the generator made last.
+    pub(super) fn complete(
+        &mut self,
+        exec: &mut Exec,
+        engine: &Engine,
+        options: &SessionOptions,
+        plan: &Plan,
+        probe: &mut Option<&mut dyn Probe>,
+    ) -> Result<()> {
+        let (block, root) = (self.block, self.motion.root());
+        let token = self.generator.history().len() - 1;
+        self.latent.copy_from_slice(self.generator.history().z(token));
         tell(probe, block, "latents", &self.latent);
 
         let usable = !options.guard || self.latent.iter().all(|z| z.abs() < MAX_LATENT);
         if !usable {
             // Nothing of the kind may stay in the history or in a cache.
             self.latent.fill(0.0);
-            let token = self.generator.history().len() - 1;
             self.generator.history_mut().replace(token, &self.latent);
             self.generator.forget();
         }
         engine.latent.restore(&mut self.latent);
-        engine.decoder.step(&mut self.exec, &mut self.decoder, &self.latent, &mut self.features);
+        engine.decoder.step(exec, &mut self.decoder, &self.latent, &mut self.features);
         if options.guard && !finite(&self.features) {
             self.decoder.reset(block);
         }
@@ -236,7 +257,7 @@ impl BlockState {
             self.features.fill(f32::NAN);
         }
         self.anchor.step(
-            &mut self.exec,
+            exec,
             engine,
             &mut self.generator,
             &mut self.decoder,
@@ -248,7 +269,7 @@ impl BlockState {
         tell(probe, block, "decoded", &self.features);
         if let Some((passes, sampler)) = plan.catch_up {
             for _ in 0..passes {
-                self.generator.catch_up(&mut self.exec, &engine.flow, student, sampler);
+                self.generator.catch_up(exec, engine.nets(), sampler);
             }
         }
 

@@ -11,6 +11,7 @@
 //! | `block` | the computation of a block |
 //! | `anchor` | re-anchoring: encoding recent motion anew, spread over blocks |
 //! | `governor/` | quality traded for time, block by block |
+//! | `team` | several sessions stepped together |
 //! | `stats` | block times and counters |
 //! | `probe` | every stage of a block, for whoever wants to check the maths |
 //!
@@ -24,21 +25,24 @@ mod inputs;
 mod options;
 mod probe;
 mod stats;
+mod team;
 
 pub use governor::{Budget, Decision, Governor, GovernorStats, Hold, Plan};
 pub use options::{Anchoring, HistoryTime, SessionOptions};
 pub use probe::Probe;
 pub use stats::{Delays, InputStats, SessionStats};
+pub use team::Team;
 
 use crate::audio::Voice;
 use crate::engine::Engine;
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{BLOCK_FRAMES, FPS, Frame, Sampler};
+use crate::kernels::Exec;
 use block::BlockState;
 use glam::Vec3;
 use governor::{Log, Policy};
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// All mutable state of one conversation.
 ///
@@ -47,6 +51,7 @@ use std::time::Instant;
 pub struct Session {
     engine: Arc<Engine>,
     options: SessionOptions,
+    exec: Exec,
     state: BlockState,
     now: f64,
     times: stats::BlockTimes,
@@ -54,14 +59,21 @@ pub struct Session {
     log: Log,
     /// The last block, until the next decision: its plan, its work, and the milliseconds that it took.
     last: Option<(Plan, f64, f64)>,
+    /// In the hands of a team: the block that is due, and the one that is computed.
+    due: Option<team::Due>,
+    done: Option<team::Due>,
 }
 
 impl Session {
     pub(crate) fn new(engine: Arc<Engine>, options: SessionOptions) -> Result<Self> {
         options.check(&engine)?;
-        let state = BlockState::new(&engine, &options)?;
+        let mut exec = engine.exec(options.threads)?;
+        options.core_mask.map_or(Ok(()), |mask| exec.pool().pin_helper(mask))?;
+        let state = BlockState::new(&mut exec, &engine, &options)?;
         let times = stats::BlockTimes::new();
-        let mut session = Self { engine, options, state, now: 0.0, times, policy: None, log: Log::new(), last: None };
+        let (log, policy, last) = (Log::new(), None, None);
+        let mut session =
+            Self { engine, options, exec, state, now: 0.0, times, policy, log, last, due: None, done: None };
         session.policy = session.fresh_policy();
         Ok(session)
     }
@@ -114,12 +126,15 @@ impl Session {
     }
 
     /// Sets the gaze target, 0 (averted) to 1 (sustained eye contact), or `None` for what the model finds natural.
-    /// Takes effect with the next block.
+    /// Takes effect with the next block. The first target takes the memory of its guidance branch, a copy of some megabytes.
     ///
     /// # Errors
     /// [`ErrorKind::Argument`] outside -1 to 1.
     pub fn set_gaze(&mut self, target: Option<f32>) -> Result<()> {
         options::check_gaze(target)?;
+        if target.is_some() {
+            self.state.generator.open_gaze();
+        }
         self.options.gaze = target;
         Ok(())
     }
@@ -239,6 +254,27 @@ impl Session {
     /// # Errors
     /// As [`Session::poll`].
     pub fn poll_with(&mut self, now: f64, probe: Option<&mut dyn Probe>) -> Result<Option<&[Frame]>> {
+        if !self.is_due(now)? {
+            return Ok(None);
+        }
+        let (plan, work) = self.start();
+        let started = Instant::now();
+        self.exec.begin();
+        let done = self.state.compute(&mut self.exec, &self.engine, &self.options, &plan, probe);
+        self.exec.end();
+        self.ended(plan, work, started.elapsed());
+        done?;
+        Ok(Some(&self.state.frames))
+    }
+
+    /// Sets the time; whether a block is due.
+    fn is_due(&mut self, now: f64) -> Result<bool> {
+        self.check_time(now)?;
+        self.now = now;
+        Ok(now >= self.next_due() - 1e-9)
+    }
+
+    fn check_time(&self, now: f64) -> Result<()> {
         if !now.is_finite() {
             return Err(Error::new(ErrorKind::Argument, format!("poll at {now}: pass seconds of session time")));
         }
@@ -246,21 +282,25 @@ impl Session {
             let message = format!("poll at {now} s after {} s: session time does not run backwards", self.now);
             return Err(Error::new(ErrorKind::State, message));
         }
-        self.now = now;
-        if now < self.next_due() - 1e-9 {
-            return Ok(None);
-        }
+        Ok(())
+    }
+
+    /// Decides about the next block: its plan and its work.
+    fn start(&mut self) -> (Plan, f64) {
         let (plan, work) = self.plan();
         self.log.record(self.state.block, plan);
-        let started = Instant::now();
-        self.state.begin();
-        let done = self.state.compute(&self.engine, &self.options, &plan, probe);
-        self.state.end();
-        let elapsed = started.elapsed();
+        (plan, work)
+    }
+
+    /// Remembers what the block took.
+    fn ended(&mut self, plan: Plan, work: f64, elapsed: Duration) {
         self.times.record(elapsed);
         self.last = Some((plan, work, 1000.0 * elapsed.as_secs_f64()));
-        done?;
-        Ok(Some(&self.state.frames))
+    }
+
+    /// The frames of the last block, or `None` before the first.
+    pub fn frames(&self) -> Option<&[Frame]> {
+        (self.state.block > self.options.first_block).then_some(&self.state.frames)
     }
 
     /// Session time at which the next block is due, seconds.
@@ -279,7 +319,7 @@ impl Session {
         self.log.clear();
         self.policy = self.fresh_policy();
         self.last = None;
-        self.state.reset(&self.engine, &self.options)
+        self.state.reset(&mut self.exec, &self.engine, &self.options)
     }
 
     /// Computes `blocks` blocks for nothing and starts anew, so that pages, caches and the CPU's clock are warm when the
@@ -298,7 +338,7 @@ impl Session {
     /// The kernel's ids of the threads that this session owns and computes on, for performance hints: the second
     /// thread's where there is one. The thread that calls [`Session::poll`] computes too ([`crate::par::current_thread_id`]).
     pub fn worker_thread_ids(&self) -> impl Iterator<Item = u32> {
-        self.state.helper_thread_id().into_iter()
+        self.exec.pool().helper_id().into_iter()
     }
 
     /// Replaces the seeded noise of the coming tokens: `noise` holds `[tokens, latent]` values, for the idle clip's

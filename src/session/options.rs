@@ -131,7 +131,7 @@ impl SessionOptions {
         }
         self.governor.check()?;
         match self.sampler {
-            Sampler::Midpoint(1 | 2 | 4) | Sampler::Euler(1..=64) => Ok(()),
+            Sampler::Midpoint(1 | 2 | 4) | Sampler::Euler(1..=64) if engine.flow.is_some() => Ok(()),
             Sampler::Single if engine.student.is_some() => Ok(()),
             other => Err(unsupported(other, engine)),
         }
@@ -174,9 +174,15 @@ pub(super) fn check_guidance(weight: f32) -> Result<()> {
 
 pub(super) fn unsupported(sampler: Sampler, engine: &Engine) -> Error {
     argument(match sampler {
+        Sampler::Single if engine.student.is_none() && engine.config.student.is_some() => {
+            "the single-step sampler needs the student network, which this engine was loaded without".to_owned()
+        }
         Sampler::Single if engine.student.is_none() => {
             "the single-step sampler needs a bundle with a student network; this one has none (see `visavis inspect`)"
                 .to_owned()
+        }
+        Sampler::Midpoint(1 | 2 | 4) | Sampler::Euler(1..=64) if engine.flow.is_none() => {
+            format!("{sampler} needs the reference network, which this engine was loaded without: use the single step")
         }
         Sampler::Single | Sampler::Midpoint(_) => format!("{sampler}: midpoint takes 1, 2 or 4 steps"),
         Sampler::Euler(n) if (1..=64).contains(&n) => {

@@ -102,17 +102,11 @@ impl Stack {
                 norm2: norms.ln2.tables(d, index),
                 gate2: None,
             };
-            layer.run(
-                exec,
-                i,
-                self.config.heads,
-                norms,
-                &state.phases,
-                &mut state.cache,
-                &mut state.rows,
-                &mut state.scratch,
-                &mut state.x,
-            );
+            let heads = self.config.heads;
+            let StackState { cache, rows, phases, scratch, x, .. } = &mut *state;
+            layer.run(exec, heads, norms, phases, n as usize, scratch, x, &mut |exec, qkv, out| {
+                rows.attend(exec, i, heads, cache, qkv, out);
+            });
         }
         let (shift, scale) = self.final_norm.tables(d, index);
         exec.norm(&state.x, n as usize, d, shift, scale, &mut state.normed);

@@ -80,14 +80,24 @@ impl KvCache {
     /// # Panics
     /// When a ring does not exist.
     pub fn copy_token(&mut self, from_ring: usize, to_ring: usize, position: u64) {
-        let (from, to) = (self.at(from_ring, position), self.at(to_ring, position));
-        let dim = self.dim;
-        fn copy<T: Plain>(store: &mut Buffer, from: usize, to: usize, dim: usize) {
-            store.of_mut::<T>().copy_within(from..from + dim, to);
+        self.copy(self.at(from_ring, position), self.at(to_ring, position), self.dim);
+    }
+
+    /// Copies all tokens from one ring to another.
+    ///
+    /// # Panics
+    /// When a ring does not exist.
+    pub fn copy_ring(&mut self, from_ring: usize, to_ring: usize) {
+        self.copy(self.at(from_ring, 0), self.at(to_ring, 0), self.capacity * self.dim);
+    }
+
+    fn copy(&mut self, from: usize, to: usize, n: usize) {
+        fn copy<T: Plain>(store: &mut Buffer, from: usize, to: usize, n: usize) {
+            store.of_mut::<T>().copy_within(from..from + n, to);
         }
         match &mut self.store {
-            Store::F16(keys, values) => [keys, values].map(|store| copy::<f16>(store, from, to, dim)),
-            Store::F32(keys, values) => [keys, values].map(|store| copy::<f32>(store, from, to, dim)),
+            Store::F16(keys, values) => [keys, values].map(|store| copy::<f16>(store, from, to, n)),
+            Store::F32(keys, values) => [keys, values].map(|store| copy::<f32>(store, from, to, n)),
         };
     }
 

@@ -1,0 +1,70 @@
+//! Engines that hold some networks of a bundle only: the same motion in less memory, and typed refusals.
+
+mod common;
+
+use common::{golden_path, tiny};
+use std::sync::Arc;
+use visavis::bundle::BundleFile;
+use visavis::engine::{Engine, Networks};
+use visavis::error::ErrorKind;
+use visavis::frame::Sampler;
+use visavis::kernels::Kernels;
+use visavis::session::{Anchoring, SessionOptions};
+
+fn load(networks: Networks) -> visavis::error::Result<Arc<Engine>> {
+    let file = BundleFile::open(golden_path("tiny.safetensors")).expect("the tiny bundle opens");
+    Engine::from_file_with(&file, Kernels::detect().expect("kernels"), networks)
+}
+
+#[test]
+fn what_is_left_makes_the_same_motion_in_less_memory() {
+    let whole = tiny();
+    let all = Networks::default();
+    for (networks, sampler) in [
+        (Networks { reference: false, ..all }, Sampler::Single),
+        (Networks { student: false, ..all }, Sampler::Midpoint(4)),
+        (Networks { reference: false, encoder: false, ..all }, Sampler::Single),
+        (Networks { student: false, encoder: false, ..all }, Sampler::Euler(3)),
+    ] {
+        let part = load(networks).expect("it loads");
+        assert!(part.weight_bytes() < whole.weight_bytes());
+        assert_eq!(part.block_bytes(sampler), whole.block_bytes(sampler));
+        // A round of re-anchoring takes fewer blocks where there are fewer caches to renew.
+        let options = SessionOptions { sampler, anchoring: Anchoring::Never, ..Default::default() };
+        let [mut a, mut b] = [&part, &whole].map(|engine| engine.session(options.clone()).expect("session"));
+        let (a_motion, b_motion) = (common::poll_blocks(&mut a, 40), common::poll_blocks(&mut b, 40));
+        assert!(a_motion == b_motion, "{networks:?}");
+        assert!(a.stats().cache_bytes < b.stats().cache_bytes);
+    }
+}
+
+#[test]
+fn it_takes_the_encoder_to_re_anchor() {
+    for encoder in [true, false] {
+        let engine = load(Networks { encoder, reference: false, ..Networks::default() }).expect("it loads");
+        let options = SessionOptions { sampler: Sampler::Single, anchoring: Anchoring::Every(4), ..Default::default() };
+        let mut session = engine.session(options).expect("session");
+        common::poll_blocks(&mut session, 40);
+        assert_eq!(session.stats().anchorings > 0, encoder);
+    }
+}
+
+#[test]
+fn what_is_missing_is_refused_by_name() {
+    let all = Networks::default();
+    let neither = load(Networks { reference: false, student: false, ..all }).expect_err("nothing to make motion with");
+    assert_eq!(neither.kind(), ErrorKind::Argument);
+    for (networks, sampler, missing) in [
+        (Networks { reference: false, ..all }, Sampler::Midpoint(4), "reference network"),
+        (Networks { student: false, ..all }, Sampler::Single, "student network"),
+    ] {
+        let engine = load(networks).expect("it loads");
+        let refused = engine.session(SessionOptions { sampler, ..Default::default() }).expect_err("refused");
+        assert_eq!(refused.kind(), ErrorKind::Argument);
+        assert!(refused.to_string().contains(missing), "{refused}");
+        let other = if sampler == Sampler::Single { Sampler::Midpoint(2) } else { Sampler::Single };
+        let mut session = engine.session(SessionOptions { sampler: other, ..Default::default() }).expect("session");
+        let refused = session.set_sampler(sampler).expect_err("refused later too");
+        assert!(refused.to_string().contains(missing), "{refused}");
+    }
+}

@@ -1,0 +1,128 @@
+//! Sessions that are stepped together show what each shows by itself, bit for bit.
+
+mod common;
+
+use common::{Inputs, tiny, tiny_in};
+use std::sync::Arc;
+use visavis::engine::Engine;
+use visavis::error::ErrorKind;
+use visavis::frame::{Frame, Sampler};
+use visavis::kernels::Scheme;
+use visavis::session::{Anchoring, Budget, Governor, Session, SessionOptions};
+
+const BLOCKS: usize = 60;
+
+/// Six conversations that differ in all that may differ; most are at times alike.
+fn sessions(engine: &Arc<Engine>, inputs: &Inputs) -> Vec<Session> {
+    let usual = SessionOptions { anchoring: Anchoring::Every(12), ..Default::default() };
+    let options = [
+        usual.clone(),
+        SessionOptions { seed: 1, gaze: Some(0.7), guidance: Some(2.0), ..usual.clone() },
+        SessionOptions { seed: 2, first_block: 1000, temperature: Some(0.5), ..usual.clone() },
+        SessionOptions { seed: 3, sampler: Sampler::Single, ..usual.clone() },
+        SessionOptions { seed: 4, sampler: Sampler::Euler(3), ..usual.clone() },
+        SessionOptions { seed: 5, sampler: Sampler::Single, anchoring: Anchoring::Never, ..usual },
+    ];
+    let session = |options: SessionOptions| {
+        let mut session = engine.session(options).expect("session");
+        session.push_agent_audio(&inputs.agent, inputs.rate).expect("agent audio");
+        session.push_user_audio(&inputs.user, inputs.rate).expect("user audio");
+        inputs.path.iter().for_each(|(time, position)| session.push_user_head(*position, *time).expect("head"));
+        session
+    };
+    options.into_iter().map(session).collect()
+}
+
+/// What happens to session `i` before its block `block`.
+fn event(session: &mut Session, i: usize, block: usize) {
+    if (i, block) == (0, 20) || (i, block) == (1, 30) {
+        session.set_gaze((i == 0).then_some(0.2)).expect("gaze");
+    }
+    if i == 2 && (25..40).contains(&block) && block.is_multiple_of(5) {
+        let sampler = [Sampler::Midpoint(1), Sampler::Single, Sampler::Midpoint(4)][block / 5 % 3];
+        session.set_sampler(sampler).expect("sampler");
+    }
+}
+
+fn same(a: &[Frame], b: &[Frame]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a == b)
+}
+
+#[test]
+fn together_and_alone_are_the_same_bits() {
+    let inputs = Inputs::circling(common::block_seconds(BLOCKS), 24_000);
+    for (engine, threads) in [(tiny(), 1), (tiny_in(Scheme::I8), 2), (tiny_in(Scheme::I4), 1)] {
+        let mut alone = sessions(&engine, &inputs);
+        let mut together = sessions(&engine, &inputs);
+        let mut team = engine.team(threads).expect("team");
+        for block in 0..BLOCKS {
+            let mut due: Vec<_> = together
+                .iter_mut()
+                .enumerate()
+                .map(|(i, session)| {
+                    event(session, i, block);
+                    let now = session.next_due();
+                    (session, now)
+                })
+                .collect();
+            assert_eq!(team.step(&mut due).expect("step"), due.len());
+            assert_eq!(team.step(&mut due).expect("step"), 0, "nobody is due twice");
+            for (i, (alone, together)) in alone.iter_mut().zip(&together).enumerate() {
+                event(alone, i, block);
+                let frames = alone.poll(alone.next_due()).expect("poll").expect("a block is due");
+                assert!(same(frames, together.frames().expect("frames")), "session {i}, block {block}");
+            }
+        }
+        let shared = team.shared_blocks();
+        assert!(shared > 2 * BLOCKS as u64 && shared < 6 * BLOCKS as u64, "{shared} blocks shared passes");
+    }
+}
+
+#[test]
+fn only_those_that_are_due_are_stepped() {
+    let engine = tiny();
+    let mut team = engine.team(1).expect("team");
+    let mut a = engine.session(SessionOptions::default()).expect("session");
+    let mut b = engine.session(SessionOptions { seed: 1, ..Default::default() }).expect("session");
+    assert!(a.frames().is_none());
+    assert_eq!(team.step(&mut [(&mut a, 0.0), (&mut b, 0.0)]).expect("step"), 2);
+    assert_eq!(team.step(&mut [(&mut a, 0.2), (&mut b, 0.1)]).expect("step"), 1);
+    assert_eq!((a.frames().expect("frames")[0].index, b.frames().expect("frames")[0].index), (4, 0));
+    assert_eq!(team.step(&mut []).expect("step"), 0);
+    assert_eq!(team.step(&mut [(&mut b, 0.3)]).expect("a session may be stepped by itself"), 1);
+    assert_eq!(b.poll(0.3).expect("poll").map(|frames| frames[0].index), Some(8), "and go on alone");
+}
+
+#[test]
+fn governed_sessions_count_their_share() {
+    let engine = tiny();
+    let mut team = engine.team(1).expect("team");
+    let options = SessionOptions { governor: Governor::Budget(Budget::default()), ..Default::default() };
+    let mut sessions = [0, 1].map(|seed| engine.session(SessionOptions { seed, ..options.clone() }).expect("session"));
+    for _ in 0..10 {
+        let [a, b] = &mut sessions;
+        let (now_a, now_b) = (a.next_due(), b.next_due());
+        assert_eq!(team.step(&mut [(a, now_a), (b, now_b)]).expect("step"), 2);
+    }
+    for session in &sessions {
+        let stats = session.stats();
+        assert!(stats.blocks == 10 && stats.block_ms[0] > 0.0, "{stats:?}");
+    }
+}
+
+#[test]
+fn what_cannot_be_stepped_is_refused_before_anything_is_computed() {
+    let (engine, other) = (tiny(), tiny());
+    let mut team = engine.team(1).expect("team");
+    let mut ours = engine.session(SessionOptions::default()).expect("session");
+    let mut theirs = other.session(SessionOptions::default()).expect("session");
+    let refused = team.step(&mut [(&mut ours, 0.0), (&mut theirs, 0.0)]).expect_err("another engine's");
+    assert_eq!(refused.kind(), ErrorKind::Argument);
+    let refused = team.step(&mut [(&mut ours, f64::NAN)]).expect_err("not a time");
+    assert_eq!(refused.kind(), ErrorKind::Argument);
+    assert!(ours.frames().is_none());
+    assert_eq!(team.step(&mut [(&mut ours, 1.0)]).expect("step"), 1);
+    let refused = team.step(&mut [(&mut ours, 0.5)]).expect_err("time does not run backwards");
+    assert_eq!(refused.kind(), ErrorKind::State);
+    assert_eq!(engine.team(3).expect_err("one or two threads").kind(), ErrorKind::Argument);
+}
