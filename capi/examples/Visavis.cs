@@ -42,7 +42,9 @@ namespace Visavis
         public uint SamplerSteps;
         public float Gaze, Guidance, GazeGuidance, Temperature;
         public double StartX, StartZ, StartYaw;
-        public uint Stance, Reserved;
+        public uint Stance, Guard;
+        public float BudgetMs;
+        public uint Reserved;
     }
 
     [StructLayout(LayoutKind.Sequential)]
@@ -52,7 +54,8 @@ namespace Visavis
         public double Time, RootX, RootZ, RootYaw;
         public float HipsX, HipsY, HipsZ, FitError, Gaze;
         public int SamplerKind;
-        public uint SamplerSteps, Reserved;
+        public uint SamplerSteps;
+        public float Held;
     }
 
     [StructLayout(LayoutKind.Sequential)]
@@ -78,6 +81,7 @@ namespace Visavis
         public ulong Anchorings, CacheBytes;
         public VoiceStats AgentVoice, UserVoice;
         public ulong HeadAccepted, HeadNonFinite, HeadOutOfOrder, HeadAbsurd, HeadTeleports, HeadOverwritten;
+        public ulong GovernorMissed, GovernorDown, GovernorUp, GovernorHeldBlocks, GovernorCatchUpPasses, GuardTrips, GuardHeldFrames;
     }
 
     internal static class Native
@@ -114,6 +118,8 @@ namespace Visavis
         [DllImport(Library)] public static extern Status visavis_session_set_natural_gaze(IntPtr session);
         [DllImport(Library)] public static extern Status visavis_session_set_guidance(IntPtr session, float weight, float gaze);
         [DllImport(Library)] public static extern Status visavis_session_set_sampler(IntPtr session, int kind, uint steps);
+        [DllImport(Library)] public static extern Status visavis_session_set_budget(IntPtr session, float milliseconds);
+        [DllImport(Library)] public static extern Status visavis_session_report_block_time(IntPtr session, double milliseconds);
         [DllImport(Library)] public static extern Status visavis_session_poll(IntPtr session, double now, [Out] Frame[] frames, UIntPtr frameSize, [Out] Joint[] joints, UIntPtr jointCapacity, out uint frameCount);
         [DllImport(Library)] public static extern Status visavis_session_next_due(IntPtr session, out double time);
         [DllImport(Library)] public static extern Status visavis_session_reset(IntPtr session);

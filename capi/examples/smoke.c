@@ -82,6 +82,9 @@ static void options_and_versions(const visavis_engine *engine) {
     options.gaze = 2;
     REFUSED(ARGUMENT, visavis_session_new(engine, &options, &session));
     OK(visavis_session_options_init(&options, sizeof options));
+    options.budget_ms = 1000;
+    REFUSED(ARGUMENT, visavis_session_new(engine, &options, &session));
+    OK(visavis_session_options_init(&options, sizeof options));
     options.sampler_kind = 77;
     REFUSED(ARGUMENT, visavis_session_new(engine, &options, &session));
     options.struct_size = 3;
@@ -167,6 +170,11 @@ static uint64_t drive(const visavis_engine *engine, uint32_t threads, int blocks
     OK(visavis_session_set_natural_gaze(session));
     OK(visavis_session_set_gaze(session, 1));
     OK(visavis_session_set_guidance(session, 1.3f, 2));
+    REFUSED(ARGUMENT, visavis_session_set_budget(session, 0.5f));
+    REFUSED(ARGUMENT, visavis_session_set_budget(session, NAN));
+    REFUSED(ARGUMENT, visavis_session_report_block_time(session, -1));
+    OK(visavis_session_set_budget(session, 100));
+    OK(visavis_session_report_block_time(session, 5));
     OK(visavis_session_finish_audio(session, VISAVIS_VOICE_AGENT));
     OK(visavis_session_clear_audio(session, VISAVIS_VOICE_USER));
     OK(visavis_session_set_audio_present(session, VISAVIS_VOICE_USER, 0));

@@ -182,8 +182,13 @@ typedef struct visavis_session_options {
     double start_z;
     // See start_x.
     double start_yaw;
-    // Whether planted feet are kept in place by the root; 1 by default.
+    // Whether planted feet are kept in place; 1 by default.
     uint32_t stance;
+    // Whether frames that no body could show are replaced by a held pose; 1 by default.
+    uint32_t guard;
+    // Milliseconds that a block may take, 1 to 133.3: a governor then chooses the sampler of each block, the session's
+    // sampler at best, so that none comes late. 0 (default): the session's sampler, always.
+    float budget_ms;
     // 0.
     uint32_t reserved;
 } visavis_session_options;
@@ -210,8 +215,8 @@ typedef struct visavis_frame {
     int32_t sampler_kind;
     // Steps of that sampler.
     uint32_t sampler_steps;
-    // 0.
-    uint32_t reserved;
+    // How much of the frame is a held pose instead of the model's, 0 to 1.
+    float held;
 } visavis_frame;
 
 // One joint of a frame. Quaternions are x, y, z, w.
@@ -274,6 +279,20 @@ typedef struct visavis_stats {
     uint64_t head_teleports;
     // Dropped to make room before they were asked for.
     uint64_t head_overwritten;
+    // Blocks that took longer than the budget; this and the next four are 0 without a budget.
+    uint64_t governor_missed;
+    // Changes to a cheaper sampler.
+    uint64_t governor_down;
+    // Changes to a better sampler.
+    uint64_t governor_up;
+    // Blocks whose motion was held because even the cheapest sampler took too long.
+    uint64_t governor_held_blocks;
+    // Passes spent on bringing skipped flow times up to date.
+    uint64_t governor_catch_up_passes;
+    // Times that the plausibility guard took over.
+    uint64_t guard_trips;
+    // Frames that it held, or faded back.
+    uint64_t guard_held_frames;
 } visavis_stats;
 
 #ifdef __cplusplus
@@ -384,6 +403,16 @@ visavis_status visavis_session_set_guidance(struct visavis_session *session, flo
 
 // Sets the sampler from the next block on; `kind` is a visavis_sampler_kind.
 visavis_status visavis_session_set_sampler(struct visavis_session *session, int32_t kind, uint32_t steps);
+
+// Sets the milliseconds that a block may take, 1 to 133.3, from the next block on: a governor then chooses the sampler of
+// each block, the session's at best. 0 pins the session's sampler.
+visavis_status visavis_session_set_budget(struct visavis_session *session,
+                                          float milliseconds);
+
+// Tells the governor how long the last block took by the caller's clock, in place of what the session measured: for callers
+// whose deadline covers more than visavis_session_poll.
+visavis_status visavis_session_report_block_time(struct visavis_session *session,
+                                                 double milliseconds);
 
 // Computes the next block if it is due at `now` (session time, seconds, never running backwards). Call it until
 // `*frame_count` is 0: a caller that comes late gets all blocks that it missed.

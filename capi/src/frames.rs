@@ -27,8 +27,8 @@ pub struct VisavisFrame {
     pub sampler_kind: i32,
     /// Steps of that sampler.
     pub sampler_steps: u32,
-    /// 0.
-    pub reserved: u32,
+    /// How much of the frame is a held pose instead of the model's, 0 to 1.
+    pub held: f32,
 }
 
 /// One joint of a frame. Quaternions are x, y, z, w.
@@ -57,7 +57,7 @@ impl VisavisFrame {
             gaze: f.gaze.unwrap_or(f32::NAN),
             sampler_kind,
             sampler_steps,
-            reserved: 0,
+            held: f.held,
         }
     }
 }

@@ -3,7 +3,7 @@
 use crate::status::{Failure, Outcome, VisavisStatus, guard};
 use crate::structs::{Sized32, check, sized_struct};
 use visavis::frame::{Root, Sampler};
-use visavis::session::SessionOptions;
+use visavis::session::{Budget, Governor, SessionOptions};
 
 /// How a block is made: evaluations of the network against quality.
 #[repr(i32)]
@@ -47,8 +47,13 @@ pub struct VisavisSessionOptions {
     pub start_z: f64,
     /// See start_x.
     pub start_yaw: f64,
-    /// Whether planted feet are kept in place by the root; 1 by default.
+    /// Whether planted feet are kept in place; 1 by default.
     pub stance: u32,
+    /// Whether frames that no body could show are replaced by a held pose; 1 by default.
+    pub guard: u32,
+    /// Milliseconds that a block may take, 1 to 133.3: a governor then chooses the sampler of each block, the session's
+    /// sampler at best, so that none comes late. 0 (default): the session's sampler, always.
+    pub budget_ms: f32,
     /// 0.
     pub reserved: u32,
 }
@@ -72,6 +77,8 @@ impl VisavisSessionOptions {
             start_z: 0.0,
             start_yaw: 0.0,
             stance: 1,
+            guard: 1,
+            budget_ms: 0.0,
             reserved: 0,
         }
     }
@@ -96,9 +103,19 @@ impl VisavisSessionOptions {
             temperature: given(o.temperature),
             start: Root { x: o.start_x, z: o.start_z, yaw: o.start_yaw },
             stance: o.stance != 0,
+            guard: o.guard != 0,
+            governor: governor(o.budget_ms),
             ..Default::default()
         })
     }
+}
+
+/// No governor for 0, else one with that budget.
+pub(crate) fn governor(budget_ms: f32) -> Governor {
+    if budget_ms == 0.0 {
+        return Governor::Off;
+    }
+    Governor::Budget(Budget { milliseconds: budget_ms, ..Default::default() })
 }
 
 /// The sampler that `kind` and `steps` stand for.

@@ -3,7 +3,7 @@
 use crate::VISAVIS_BLOCK_FRAMES;
 use crate::engine::VisavisEngine;
 use crate::frames::{VisavisFrame, VisavisJoint, joints_of};
-use crate::options::{VisavisSessionOptions, sampler};
+use crate::options::{VisavisSessionOptions, governor, sampler};
 use crate::status::{Failure, Outcome, VisavisStatus, guard};
 use crate::structs::{borrow, place, room, slice};
 use std::sync::{Mutex, TryLockError};
@@ -198,6 +198,25 @@ pub unsafe extern "C" fn visavis_session_set_sampler(
 ) -> VisavisStatus {
     // SAFETY: the header's promise.
     unsafe { with(session, |s| Ok(s.set_sampler(sampler(kind, steps)?)?)) }
+}
+
+/// Sets the milliseconds that a block may take, 1 to 133.3, from the next block on: a governor then chooses the sampler of
+/// each block, the session's at best. 0 pins the session's sampler.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_set_budget(session: *mut VisavisSession, milliseconds: f32) -> VisavisStatus {
+    // SAFETY: the header's promise.
+    unsafe { with(session, |s| Ok(s.set_governor(governor(milliseconds))?)) }
+}
+
+/// Tells the governor how long the last block took by the caller's clock, in place of what the session measured: for callers
+/// whose deadline covers more than visavis_session_poll.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_report_block_time(
+    session: *mut VisavisSession,
+    milliseconds: f64,
+) -> VisavisStatus {
+    // SAFETY: the header's promise.
+    unsafe { with(session, |s| Ok(s.report_block_time(milliseconds)?)) }
 }
 
 /// Computes the next block if it is due at `now` (session time, seconds, never running backwards). Call it until

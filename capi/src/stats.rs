@@ -60,6 +60,20 @@ pub struct VisavisStats {
     pub head_teleports: u64,
     /// Dropped to make room before they were asked for.
     pub head_overwritten: u64,
+    /// Blocks that took longer than the budget; this and the next four are 0 without a budget.
+    pub governor_missed: u64,
+    /// Changes to a cheaper sampler.
+    pub governor_down: u64,
+    /// Changes to a better sampler.
+    pub governor_up: u64,
+    /// Blocks whose motion was held because even the cheapest sampler took too long.
+    pub governor_held_blocks: u64,
+    /// Passes spent on bringing skipped flow times up to date.
+    pub governor_catch_up_passes: u64,
+    /// Times that the plausibility guard took over.
+    pub guard_trips: u64,
+    /// Frames that it held, or faded back.
+    pub guard_held_frames: u64,
 }
 
 sized_struct!(VisavisStats, "visavis_stats");
@@ -97,6 +111,13 @@ impl From<SessionStats> for VisavisStats {
             head_absurd: s.inputs.head.absurd,
             head_teleports: s.inputs.head.teleports,
             head_overwritten: s.inputs.head.overwritten,
+            governor_missed: s.governor.missed,
+            governor_down: s.governor.down,
+            governor_up: s.governor.up,
+            governor_held_blocks: s.governor.held_blocks,
+            governor_catch_up_passes: s.governor.catch_up_passes,
+            guard_trips: s.guard.trips,
+            guard_held_frames: s.guard.held_frames,
         }
     }
 }

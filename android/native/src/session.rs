@@ -13,18 +13,18 @@ use std::cell::RefCell;
 use std::sync::{Arc, Mutex, MutexGuard};
 use visavis::audio::Voice;
 use visavis::frame::{BLOCK_FRAMES, Frame, Root};
-use visavis::session::{Session, SessionOptions};
+use visavis::session::{Budget, Governor, Session, SessionOptions};
 
 pub(crate) static SESSIONS: Table<Mutex<Session>> = Table::new("session");
 
-/// Floats of a frame before its joints: root x, z, yaw; hips x, y, z; gaze score (NaN: not known); fit error.
-const HEAD: usize = 8;
+/// Floats of a frame before its joints: root x, z, yaw; hips x, y, z; gaze score (NaN: not known); fit error; held; evaluations.
+const HEAD: usize = 10;
 /// Floats of a joint: local rotation 4, world position 3, world rotation 4.
 const JOINT: usize = 11;
 
 native!("Java_org_visavis_Native_sessionNew": session_new(
     engine: jlong, seed: jlong, threads: jint, core_mask: jlong, sampler: JString, gaze: jfloat, guidance: jfloat,
-    gaze_guidance: jfloat, temperature: jfloat, x: jdouble, z: jdouble, yaw: jdouble, stance: jboolean
+    gaze_guidance: jfloat, temperature: jfloat, x: jdouble, z: jdouble, yaw: jdouble, stance: jboolean, guard: jboolean, budget: jfloat
 ) -> jlong);
 native!("Java_org_visavis_Native_sessionClose": session_close(session: jlong) -> jboolean);
 native!("Java_org_visavis_Native_pushBuffer": push_buffer(session: jlong, voice: jint, buffer: java.nio.FloatBuffer, position: jint, count: jint, rate: jint));
@@ -37,6 +37,8 @@ native!("Java_org_visavis_Native_setGaze": set_gaze(session: jlong, target: jflo
 native!("Java_org_visavis_Native_setNaturalGaze": set_natural_gaze(session: jlong));
 native!("Java_org_visavis_Native_setGuidance": set_guidance(session: jlong, weight: jfloat, gaze: jfloat));
 native!("Java_org_visavis_Native_setSampler": set_sampler(session: jlong, sampler: JString));
+native!("Java_org_visavis_Native_setBudget": set_budget(session: jlong, milliseconds: jfloat));
+native!("Java_org_visavis_Native_reportBlockTime": report_block_time(session: jlong, milliseconds: jdouble));
 native!("Java_org_visavis_Native_sampler": sampler(session: jlong) -> JString);
 native!("Java_org_visavis_Native_pollBuffer": poll_buffer(session: jlong, now: jdouble, out: java.nio.FloatBuffer, position: jint, count: jint) -> jint);
 native!("Java_org_visavis_Native_pollArray": poll_array(session: jlong, now: jdouble, out: jfloat[], offset: jint) -> jint);
@@ -70,6 +72,14 @@ pub(crate) fn push(session: &mut Session, voice: jint, samples: &[f32], rate: u3
     Ok(())
 }
 
+/// No governor for 0, else one with that budget, milliseconds a block.
+fn governor(budget: f32) -> Governor {
+    if budget == 0.0 {
+        return Governor::Off;
+    }
+    Governor::Budget(Budget { milliseconds: budget, ..Default::default() })
+}
+
 fn rate(rate: jint) -> Outcome<u32> {
     u32::try_from(rate).map_err(|_| Failure::Argument(format!("a sample rate of {rate} Hz is negative")))
 }
@@ -91,6 +101,8 @@ fn session_new<'l>(
     z: jdouble,
     yaw: jdouble,
     stance: jboolean,
+    guard: jboolean,
+    budget: jfloat,
 ) -> Outcome<jlong> {
     let engine = ENGINES.get(engine)?;
     // NaN is what Java's options hold for "the bundle's".
@@ -106,6 +118,8 @@ fn session_new<'l>(
         temperature: given(temperature),
         start: Root { x, z, yaw },
         stance,
+        guard,
+        governor: governor(budget),
         ..Default::default()
     };
     Ok(SESSIONS.insert(Arc::new(Mutex::new(engine.session(options)?))))
@@ -197,6 +211,14 @@ fn set_sampler<'l>(env: &mut Env<'l>, _: JClass<'l>, session: jlong, sampler: JS
     with(session, |s| Ok(s.set_sampler(sampler)?))
 }
 
+fn set_budget<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, milliseconds: jfloat) -> Outcome {
+    with(session, |s| Ok(s.set_governor(governor(milliseconds))?))
+}
+
+fn report_block_time<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, milliseconds: jdouble) -> Outcome {
+    with(session, |s| Ok(s.report_block_time(milliseconds)?))
+}
+
 fn sampler<'l>(env: &mut Env<'l>, _: JClass<'l>, session: jlong) -> Outcome<JString<'l>> {
     let name = with(session, |s| Ok(s.sampler().to_string()))?;
     Ok(JString::from_str(env, name)?)
@@ -209,7 +231,7 @@ fn write(frames: &[Frame], out: &mut [f32]) {
     for f in frames {
         put(&[f.root.x as f32, f.root.z as f32, f.root.yaw as f32]);
         put(&f.hips.to_array());
-        put(&[f.gaze.unwrap_or(f32::NAN), f.fit_error]);
+        put(&[f.gaze.unwrap_or(f32::NAN), f.fit_error, f.held, f.sampler.evaluations() as f32]);
         for (global, local) in f.global.iter().zip(&f.local) {
             put(&local.to_array());
             put(&global.position.to_array());

@@ -31,5 +31,10 @@ fn row(s: &SessionStats) -> Vec<f64> {
         [head.accepted, head.non_finite, head.out_of_order, head.absurd, head.teleports, head.overwritten]
             .map(|n| n as f64),
     );
+    let g = s.governor;
+    row.extend(
+        [g.missed, g.down, g.up, g.held_blocks, g.catch_up_passes, s.guard.trips, s.guard.held_frames]
+            .map(|n| n as f64),
+    );
     row
 }

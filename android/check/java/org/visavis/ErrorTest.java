@@ -63,6 +63,9 @@ final class ErrorTest {
             throwsWith(ARGUMENT, "threads", () -> engine.newSession(new SessionOptions().threads(-1)));
             throwsWith(ARGUMENT, "temperature", () -> engine.newSession(new SessionOptions().temperature(3)));
             throwsWith(ARGUMENT, "not a number", () -> new SessionOptions().gaze(Float.NaN));
+            throwsWith(ARGUMENT, "budget", () -> engine.newSession(new SessionOptions().budget(1000)));
+            throwsWith(ARGUMENT, "budget", () -> session.setBudget(0.5f));
+            throwsWith(ARGUMENT, "block time", () -> session.reportBlockTime(-1));
             throwsWith(ARGUMENT, "start", () -> engine.newSession(new SessionOptions().start(0, 0, Double.NaN)));
             throwsWith(ARGUMENT, "negative", () -> session.warmUp(-1));
             throwsWith(ARGUMENT, "core mask", () -> Visavis.pinCurrentThread(0));

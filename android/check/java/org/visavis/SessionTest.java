@@ -102,6 +102,25 @@ final class SessionTest {
         }
     }
 
+    /** Block times are told, not measured: the outcome does not depend on the machine. */
+    static void testBudget() throws Exception {
+        try (VisavisEngine engine = engine();
+                VisavisSession session = engine.newSession(new SessionOptions().budget(100))) {
+            float[] out = new float[session.layout().blockFloats()];
+            for (int k = 0; k < 12; k++) {
+                session.poll(session.nextDueNanos(), out, 0);
+                session.reportBlockTime(k < 8 ? 0.01 : 99_999);
+                isTrue(out[FrameLayout.HELD] >= 0 && out[FrameLayout.EVALUATIONS] >= 1, "a frame says what made it");
+            }
+            SessionStats stats = session.stats();
+            isTrue(stats.governorUp > 0, "climbs while there is time");
+            isTrue(stats.governorDown > 0 && stats.governorMissed > 0, "gives way when blocks come late");
+            session.setBudget(0);
+            session.poll(session.nextDueNanos(), out, 0);
+            equal(8f, out[FrameLayout.EVALUATIONS]);
+        }
+    }
+
     static void testTooMuchAndTooLittleSound() throws Exception {
         try (VisavisEngine engine = engine();
                 VisavisSession session = engine.newSession()) {

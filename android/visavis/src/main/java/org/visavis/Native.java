@@ -39,7 +39,8 @@ final class Native {
     static native int openXrJoint(String name);
 
     static native long sessionNew(long engine, long seed, int threads, long coreMask, String sampler, float gaze, float guidance,
-            float gazeGuidance, float temperature, double x, double z, double yaw, boolean stance);
+            float gazeGuidance, float temperature, double x, double z, double yaw, boolean stance, boolean guard,
+            float budget);
 
     static native boolean sessionClose(long session);
 
@@ -62,6 +63,10 @@ final class Native {
     static native void setGuidance(long session, float weight, float gaze);
 
     static native void setSampler(long session, String sampler);
+
+    static native void setBudget(long session, float milliseconds);
+
+    static native void reportBlockTime(long session, double milliseconds);
 
     static native String sampler(long session);
 

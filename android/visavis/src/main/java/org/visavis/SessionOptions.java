@@ -16,6 +16,8 @@ public final class SessionOptions {
     double startZ;
     double startYaw;
     boolean stance = true;
+    boolean guard = true;
+    float budget;
 
     /** Same seed and same inputs: same motion, bit for bit. Default 0. */
     @NonNull
@@ -76,10 +78,27 @@ public final class SessionOptions {
         return this;
     }
 
-    /** Whether planted feet are kept in place by the root; true by default. */
+    /** Whether planted feet are kept in place; true by default. */
     @NonNull
     public SessionOptions stance(boolean stance) {
         this.stance = stance;
+        return this;
+    }
+
+    /** Whether frames that no body could show are replaced by a held pose; true by default. */
+    @NonNull
+    public SessionOptions guard(boolean guard) {
+        this.guard = guard;
+        return this;
+    }
+
+    /**
+     * Milliseconds that a block may take, 1 to 133.3: a governor then chooses the sampler of each block, the session's at best, so that none
+     * comes late. 0 (default): the session's sampler, always.
+     */
+    @NonNull
+    public SessionOptions budget(float milliseconds) {
+        this.budget = checked("budget", milliseconds);
         return this;
     }
 

@@ -41,6 +41,21 @@ public final class SessionStats {
     /** Dropped to make room before they were asked for. */
     public final long headOverwritten;
 
+    /** Blocks that took longer than the budget; this and the next four are 0 without a budget. */
+    public final long governorMissed;
+    /** Changes to a cheaper sampler. */
+    public final long governorDown;
+    /** Changes to a better sampler. */
+    public final long governorUp;
+    /** Blocks whose motion was held because even the cheapest sampler took too long. */
+    public final long governorHeldBlocks;
+    /** Passes spent on bringing skipped flow times up to date. */
+    public final long governorCatchUpPasses;
+    /** Times that the plausibility guard took over. */
+    public final long guardTrips;
+    /** Frames that it held, or faded back. */
+    public final long guardHeldFrames;
+
     /** Counters of a voice, samples of 24 kHz unless said otherwise. */
     public static final class Voice {
         /** Silence in place of sound that had not come, while the voice was present. */
@@ -94,6 +109,13 @@ public final class SessionStats {
         headAbsurd = row.count();
         headTeleports = row.count();
         headOverwritten = row.count();
+        governorMissed = row.count();
+        governorDown = row.count();
+        governorUp = row.count();
+        governorHeldBlocks = row.count();
+        governorCatchUpPasses = row.count();
+        guardTrips = row.count();
+        guardHeldFrames = row.count();
         if (row.next != values.length) {
             throw new VisavisException("the native library gives " + values.length + " statistics, not " + row.next);
         }

@@ -110,7 +110,25 @@ public final class VisavisSession implements AutoCloseable {
         Native.setSampler(handle, sampler.name);
     }
 
-    /** The sampler that the next block will use. */
+    /**
+     * Sets the milliseconds that a block may take, 1 to 133.3, from the next block on: a governor then chooses the sampler of each block,
+     * the session's at best. 0 pins the session's sampler.
+     *
+     * @throws IllegalArgumentException for a budget out of range
+     */
+    public void setBudget(float milliseconds) {
+        Native.setBudget(handle, milliseconds);
+    }
+
+    /**
+     * Tells the governor how long the last block took by the caller's clock, in place of what the session measured: for a thread whose deadline
+     * covers more than {@link #poll}.
+     */
+    public void reportBlockTime(double milliseconds) {
+        Native.reportBlockTime(handle, milliseconds);
+    }
+
+    /** The sampler that was set; with a budget, the best one that is used. */
     @NonNull
     public Sampler sampler() {
         return Sampler.of(Native.sampler(handle));
