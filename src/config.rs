@@ -39,6 +39,9 @@ pub struct Config {
     pub student: Option<StudentConfig>,
     /// Defaults for sessions.
     pub session: SessionConfig,
+    /// What the gaze channel does to this model's gaze, as `visavis calibrate` measured it; none: not measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gaze: Option<GazeConfig>,
     /// How the weights were quantised; none for a bundle as it was exported.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub quantisation: Option<Quantisation>,
@@ -159,6 +162,41 @@ pub struct SessionConfig {
     pub anchor_period: u32,
     /// Distance from the anchor at which the session re-anchors early, metres.
     pub anchor_radius: f32,
+}
+
+/// What the gaze channel does to a model's gaze.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GazeConfig {
+    /// The reference network with gaze guidance.
+    pub guided: GazeCurve,
+    /// The reference network with the channel as one condition among others.
+    pub unguided: GazeCurve,
+    /// The single-step student, when the bundle holds one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub student: Option<GazeCurve>,
+    /// Mean gaze scores of stretches of recorded conversations at evenly spaced quantiles from the least to the largest: what free
+    /// gaze is drawn from.
+    pub levels: Vec<f32>,
+    /// Length of such a stretch, seconds.
+    pub seconds: f32,
+}
+
+/// Pairs of a mean gaze score and the channel's value that brings it about, both ascending; linear between, constant beyond.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct GazeCurve(pub Vec<[f32; 2]>);
+
+impl GazeCurve {
+    /// The channel's value for a wanted mean gaze score.
+    pub fn channel(&self, score: f32) -> f32 {
+        let above = self.0.partition_point(|[s, _]| *s < score);
+        match (above.checked_sub(1).map(|i| self.0[i]), self.0.get(above)) {
+            (Some([s0, c0]), Some([s1, c1])) => c0 + (c1 - c0) * (score - s0) / (s1 - s0),
+            (None, Some([_, c])) => *c,
+            (Some([_, c]), None) => c,
+            (None, None) => score,
+        }
+    }
 }
 
 /// Flow time at which history enters an evaluation at flow time `t`: `t` itself below `from`, `max(t, tau)` from there.

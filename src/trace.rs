@@ -34,7 +34,7 @@ use crate::engine::Engine;
 use crate::error::{Error, ErrorKind, Result};
 use crate::export::write_atomically;
 use crate::frame::{BLOCK_FRAMES, FPS, SAMPLE_RATE};
-use crate::session::{Probe, SessionOptions};
+use crate::session::{GazeControl, Probe, SessionOptions};
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use std::collections::{BTreeMap, HashMap};
@@ -65,7 +65,8 @@ pub struct Trace {
 /// # Errors
 /// [`ErrorKind::Argument`] for options that the bundle cannot do, [`ErrorKind::Audio`] for voices that are not finite.
 pub fn trace(engine: &Arc<Engine>, input: &TraceInput, options: SessionOptions) -> Result<Trace> {
-    let mut session = engine.session(SessionOptions { gaze: input.gaze, ..options })?;
+    let mut session =
+        engine.session(SessionOptions { gaze: input.gaze, gaze_control: GazeControl::Channel, ..options })?;
     if let Some(noise) = &input.noise {
         session.reset_with_noise(noise.clone())?;
     }

@@ -82,6 +82,7 @@ impl Size {
                 anchor_period: 90,
                 anchor_radius: 8.0,
             },
+            gaze: None,
             quantisation: None,
         }
     }

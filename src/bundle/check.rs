@@ -5,7 +5,7 @@
 
 use super::file::invalid;
 use crate::audio::check_audio_config;
-use crate::config::Config;
+use crate::config::{Config, GazeConfig, GazeCurve};
 use crate::error::Result;
 use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES};
 use crate::pose::feature_count;
@@ -65,6 +65,9 @@ pub(super) fn config(c: &Config) -> Result<()> {
     real("session.bridge", c.session.bridge, 0.0, 30.0)?;
     within("session.anchor_period", c.session.anchor_period as usize, 0, 1 << 20)?;
     real("session.anchor_radius", c.session.anchor_radius, 0.1, 1e6)?;
+    if let Some(g) = &c.gaze {
+        gaze(g)?;
+    }
     let bytes = session_bytes(c);
     if bytes > MAX_SESSION {
         let (mib, most) = (bytes >> 20, MAX_SESSION >> 20);
@@ -74,6 +77,26 @@ pub(super) fn config(c: &Config) -> Result<()> {
         )));
     }
     Ok(())
+}
+
+/// Checks what was measured of the gaze channel.
+fn gaze(g: &GazeConfig) -> Result<()> {
+    for (name, curve) in [("guided", Some(&g.guided)), ("unguided", Some(&g.unguided)), ("student", g.student.as_ref())]
+    {
+        let Some(GazeCurve(points)) = curve else { continue };
+        within(&format!("gaze.{name}"), points.len(), 1, 64)?;
+        for value in points.as_flattened() {
+            real(&format!("gaze.{name}"), *value, -1.0, 1.0)?;
+        }
+        if points.windows(2).any(|pair| pair[1][0] <= pair[0][0] || pair[1][1] <= pair[0][1]) {
+            return Err(invalid(&format!("gaze.{name}: scores and channel values must both ascend")));
+        }
+    }
+    within("gaze.levels", g.levels.len(), 1, 1024)?;
+    for level in &g.levels {
+        real("gaze.levels", *level, -1.0, 1.0)?;
+    }
+    real("gaze.seconds", g.seconds, 0.1, 3600.0)
 }
 
 /// Bytes that a session takes at most, caches in f32; slots of their own that Euler samplers ask for come on top.

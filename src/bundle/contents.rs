@@ -120,6 +120,18 @@ impl fmt::Display for Contents {
             )?,
             None => writeln!(f, "  student  none: the sampler \"single\" is not available")?,
         }
+        match &c.gaze {
+            Some(g) => writeln!(
+                f,
+                "  gaze     calibrated; free gaze {:.2} to {:.2} in stretches of {:.1} s",
+                g.levels.iter().copied().fold(f32::INFINITY, f32::min),
+                g.levels.iter().copied().fold(f32::NEG_INFINITY, f32::max),
+                g.seconds
+            )?,
+            None => {
+                writeln!(f, "  gaze     not calibrated: targets are values of the gaze channel (`visavis calibrate`)")?
+            }
+        }
         writeln!(
             f,
             "  delays   in blocks of 133.3 ms: user {}, agent's own voice {}",

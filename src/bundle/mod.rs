@@ -8,12 +8,14 @@ mod check;
 mod contents;
 mod drawn;
 mod file;
+mod rewrite;
 mod stored;
 mod tensors;
 
 pub use audio::AudioSource;
 pub use contents::{Contents, TensorInfo};
 pub use file::{BundleFile, LoadMode};
+pub(crate) use rewrite::{Entry, assemble, failed};
 pub use stored::{StoredData, StoredWeights};
 pub use tensors::Tensors;
 

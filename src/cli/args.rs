@@ -35,6 +35,8 @@ pub enum Command {
     Bench(super::bench::BenchArgs),
     /// Judges a bundle on recorded conversations: motion, gaze, reaction, endurance, against targets
     Eval(super::eval::EvalArgs),
+    /// Measures what a bundle's gaze channel does, so that gaze targets are what they say
+    Calibrate(super::calibrate::CalibrateArgs),
     /// Drives a session through hours of motion and judges memory, allocations, drift and precision
     Soak(super::soak::SoakArgs),
     /// Runs given conditioning and noise through a bundle and writes every stage

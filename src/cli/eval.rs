@@ -96,7 +96,7 @@ pub fn run(args: &EvalArgs) -> Result<()> {
 }
 
 /// Progress on stderr: each stage once, and on a terminal how many windows of it are done.
-fn show(stage: &Mutex<String>, p: EvalProgress<'_>) {
+pub(super) fn show(stage: &Mutex<String>, p: EvalProgress<'_>) {
     let Ok(mut last) = stage.lock() else { return };
     let fresh = *last != p.stage;
     p.stage.clone_into(&mut last);

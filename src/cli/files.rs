@@ -30,6 +30,15 @@ pub fn conversation() -> Result<Conversation> {
     Conversation::read(Some(&agent?), Some(&user?), Some(&path?))
 }
 
+/// An error if both names stand for one file: a mapped bundle must not be written to.
+pub fn apart(input: &Path, output: &Path) -> Result<()> {
+    if input.canonicalize().ok().zip(output.canonicalize().ok()).is_none_or(|(a, b)| a != b) {
+        return Ok(());
+    }
+    let message = "the result would take the place of the bundle it is made from; give another name";
+    Err(Error::new(ErrorKind::Argument, message).with_path(output))
+}
+
 /// Looks for `relative` in the current folder, beside the program, and where the program was built; else what was tried.
 fn shipped(relative: &str) -> Result<PathBuf, Vec<PathBuf>> {
     let beside = std::env::current_exe().ok().and_then(|exe| Some(exe.parent()?.join(relative)));

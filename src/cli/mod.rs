@@ -5,6 +5,7 @@
 mod allocations;
 mod args;
 mod bench;
+mod calibrate;
 mod demo;
 mod eval;
 mod files;
@@ -33,6 +34,7 @@ pub fn main() -> ExitCode {
             Command::Report(args) => report::run(&args),
             Command::Bench(args) => bench::run(&args),
             Command::Eval(args) => eval::run(&args),
+            Command::Calibrate(args) => calibrate::run(&args),
             Command::Soak(args) => soak::run(&args),
             Command::Trace(args) => trace::run(&args),
         },

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
 use visavis::bundle::BundleFile;
-use visavis::error::{Error, ErrorKind, Result};
+use visavis::error::Result;
 use visavis::export::write_atomically;
 use visavis::kernels::Scheme;
 use visavis::quant::{Budget, Keep, Options, Quantised, SMALL, Scene, quantise};
@@ -45,11 +45,7 @@ fn millimetres(text: &str) -> Result<f64, String> {
 const BLOCKS: usize = 24;
 
 pub fn run(args: &QuantizeArgs) -> Result<()> {
-    let same = args.input.canonicalize().ok().zip(args.output.canonicalize().ok()).is_some_and(|(a, b)| a == b);
-    if same {
-        let message = "the result would take the place of the bundle it is made from; give another name";
-        return Err(Error::new(ErrorKind::Argument, message).with_path(&args.output));
-    }
+    files::apart(&args.input, &args.output)?;
     let file = BundleFile::open(&args.input)?;
     let progress = |what: &str| {
         // Nobody is left to tell where stderr is closed.

@@ -23,6 +23,7 @@
 //! ```
 
 mod bank;
+mod calibrate;
 mod clip;
 mod endurance;
 mod figures;
@@ -36,6 +37,7 @@ mod targets;
 mod window;
 
 pub use bank::Bank;
+pub use calibrate::calibrate;
 pub use clip::{Clip, Segment};
 pub use endurance::{Change, Endurance, Follow};
 pub use figures::{CORRECT, Figures, Row};

@@ -160,3 +160,23 @@ fn nearest_neighbours_are_near() {
     assert!(random.iter().all(|r| (r.x - truth[0].root.x).abs() < 1e-4), "put where the agent stands");
     assert!(Bank::new(clips[..1].to_vec(), true).unwrap().nearest(&windows[0]).unwrap().is_none(), "not its own clip");
 }
+
+#[test]
+fn calibration_measures_the_channel() {
+    let engine = tiny();
+    let clips = made_up(&engine.config().rig, &talk());
+    // Random weights need not follow their channel; then that is said.
+    let outcome = |threads| calibrate(&engine, &clips, 2, threads, &|_| {});
+    match (outcome(1), outcome(2)) {
+        (Ok(gaze), Ok(again)) => {
+            assert_eq!(gaze, again);
+            let file =
+                crate::bundle::BundleFile::open(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/goldens/tiny.safetensors"));
+            let bytes = file.unwrap().with_gaze(&gaze).unwrap();
+            assert_eq!(Engine::from_bytes(bytes, "calibrated").unwrap().config().gaze, Some(gaze.clone()));
+            assert!(gaze.levels.iter().all(|l| *l > 0.8), "the procedural person looks at the user: {:?}", gaze.levels);
+        }
+        (Err(a), Err(b)) => assert!(a.to_string().contains("does not follow") && a.to_string() == b.to_string(), "{a}"),
+        (a, b) => panic!("one outcome: {a:?}, {b:?}"),
+    }
+}

@@ -43,17 +43,19 @@ pub struct Condition {
     pub(super) values: Vec<f32>,
     /// Presence of the user's position, the agent's voice, the user's voice and the gaze target.
     pub(super) present: [bool; 4],
+    /// Whether the gaze target is guided towards, by a branch of its own.
+    pub(super) guided: bool,
 }
 
 impl Condition {
     /// Everything absent.
     pub fn absent(layout: ConditionLayout) -> Self {
-        Self { layout, values: vec![0.0; layout.width()], present: [false; 4] }
+        Self { layout, values: vec![0.0; layout.width()], present: [false; 4], guided: false }
     }
 
     /// Makes everything absent again.
     pub fn clear(&mut self) {
-        self.present = [false; 4];
+        (self.present, self.guided) = ([false; 4], false);
     }
 
     /// The user's floor positions `(x, z)` over four frames in the agent's frame, metres.
@@ -74,15 +76,16 @@ impl Condition {
         self.present[2] = true;
     }
 
-    /// Gaze target, -1 to 1, the same for the four frames.
-    pub fn set_gaze(&mut self, target: f32) {
+    /// Gaze target, -1 to 1, the same for the four frames. `guided`: towards it, with a guidance weight of its own; else it is a
+    /// condition among the others. The student, which has its guidance in its weights, makes no difference.
+    pub fn set_gaze(&mut self, target: f32, guided: bool) {
         self.values[self.layout.gaze()].fill(target);
-        self.present[3] = true;
+        (self.present[3], self.guided) = (true, guided);
     }
 
-    /// Whether a gaze target is present.
-    pub fn has_gaze(&self) -> bool {
-        self.present[3]
+    /// Whether a gaze target is guided towards, so that the reference network has a third branch to run.
+    pub fn guides_gaze(&self) -> bool {
+        self.present[3] && self.guided
     }
 
     /// The user's positions as given, when present.
@@ -93,7 +96,7 @@ impl Condition {
     pub(super) fn copy_from(&mut self, other: &Self) {
         debug_assert_eq!(self.layout, other.layout);
         self.values.copy_from_slice(&other.values);
-        self.present = other.present;
+        (self.present, self.guided) = (other.present, other.guided);
     }
 
     pub(super) fn layout(&self) -> ConditionLayout {

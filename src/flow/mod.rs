@@ -28,7 +28,7 @@ mod slots;
 pub use condition::{Condition, ConditionLayout};
 pub use history::History;
 pub use network::{FlowNet, Modulation};
-pub use noise::normal;
+pub use noise::{normal, uniform};
 pub use sampler::{Generator, GeneratorOptions, Guidance, Nets, X1Tap};
 pub use shared::{SHARED_ROWS, SharedPass};
 pub use slots::{Branches, Slots};

@@ -152,7 +152,8 @@ impl FlowNet {
         exec.linear(&self.input_latent, z, rows, y, Epilogue::Store);
     }
 
-    /// Input of a token's conditioning, `out` `[2, d]`: without the gaze target, and with it (the same if absent).
+    /// Input of a token's conditioning, `out` `[2, d]`: without a guided gaze target, and with it (the same if there is none, or
+    /// if it is not guided towards).
     /// `embedded` is scratch of `2 x rest_width`.
     pub(super) fn project(&self, exec: &mut Exec, condition: &Condition, embedded: &mut [f32], out: &mut [f32]) {
         let (c, rest) = (&self.config, self.rest_width());
@@ -180,14 +181,17 @@ impl FlowNet {
         if voice {
             exec.linear(&self.embed_user_voice, &condition.values[layout.user_voice()], 1, e_voice, Epilogue::Store);
         }
-        for (flag, present) in flags.iter_mut().zip([user, agent, voice, false]) {
+        let without = gaze && !condition.guides_gaze();
+        for (flag, present) in flags.iter_mut().zip([user, agent, voice, without]) {
             *flag = f32::from(u8::from(present));
         }
         if gaze {
             exec.linear(&self.embed_gaze, &condition.values[layout.gaze()], 1, e_gaze, Epilogue::Store);
         }
         with[..rest].copy_from_slice(row);
-        row[rest - 4 - c.embed_gaze..rest - 4].fill(0.0);
+        if !without {
+            row[rest - 4 - c.embed_gaze..rest - 4].fill(0.0);
+        }
         with[rest - 1] = f32::from(u8::from(gaze));
         exec.linear(&self.input_rest, embedded, 2, out, Epilogue::Store);
     }

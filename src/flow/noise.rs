@@ -16,6 +16,12 @@ pub fn normal(seed: u64, token: u64, out: &mut [f32]) {
     }
 }
 
+/// Two independent numbers in [0, 1) of index `index` under `seed`; no noise of a token comes from the same counter.
+pub fn uniform(seed: u64, index: u64) -> [f32; 2] {
+    let bits = philox([index as u32, (index >> 32) as u32, 0, 1], [seed as u32, (seed >> 32) as u32]);
+    [bits[0], bits[1]].map(|b| (b >> 8) as f32 / (1 << 24) as f32)
+}
+
 fn philox(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     for _ in 0..10 {
         let a = u64::from(counter[0]) * 0xD251_1F53;

@@ -363,7 +363,7 @@ impl Generator {
             return None;
         }
         let last = self.history.len().checked_sub(1).filter(|_| !self.history.is_empty());
-        let gaze = gaze || last.is_some_and(|token| self.history.condition(token).has_gaze());
+        let gaze = gaze || last.is_some_and(|token| self.history.condition(token).guides_gaze());
         Some(2 * if sampler == Sampler::Single { 1 } else { 2 + usize::from(gaze) })
     }
 

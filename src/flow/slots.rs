@@ -189,7 +189,7 @@ impl Slots {
     }
 
     /// x1 predictions for the new token at `z`, `[branches, latent]`, over the history that slot `slot` holds; what the
-    /// slot lacks is caught up first. Without a gaze target the gaze branch equals the one without.
+    /// slot lacks is caught up first. Where gaze is not guided, the gaze branch equals the one without.
     pub fn evaluate(&mut self, exec: &mut Exec, net: &FlowNet, history: &History, slot: usize, z: &[f32]) -> &[f32] {
         let end = history.len();
         while self.pending(slot, end) > CHUNK {
@@ -331,7 +331,7 @@ impl Slots {
         self.rows.clear();
         self.mod_index.clear();
         let start = self.slots[slot].start;
-        if tokens.clone().any(|token| history.condition(token).has_gaze()) {
+        if tokens.clone().any(|token| history.condition(token).guides_gaze()) {
             self.open_gaze();
         }
         for token in tokens.clone() {
@@ -370,31 +370,31 @@ impl Slots {
         }
         self.slots[slot].committed = commit.end;
         if new {
-            self.read_out(exec, net, history.condition(commit.end).has_gaze());
+            self.read_out(exec, net, history.condition(commit.end).guides_gaze());
         }
     }
 
-    /// Branches that are run for `token`: the gaze branch only where there is a target.
+    /// Branches that are run for `token`: the gaze branch only where a target is guided towards.
     fn active(&self, history: &History, token: u64) -> Range<usize> {
         match self.branches {
             Branches::Baked => 0..1,
-            Branches::Guided if history.condition(token).has_gaze() => 0..3,
+            Branches::Guided if history.condition(token).guides_gaze() => 0..3,
             Branches::Guided => 0..2,
         }
     }
 
-    /// A token without a gaze target is the same in both conditional branches: copies its keys and values.
+    /// A token whose gaze is not guided is the same in both conditional branches: copies its keys and values.
     fn mirror_gaze_branch(&mut self, history: &History, slot: usize, token: u64) {
-        if self.gaze && !history.condition(token).has_gaze() {
+        if self.gaze && !history.condition(token).guides_gaze() {
             let (from, to) = (self.ring(slot, NO_GAZE), self.ring(slot, GAZE));
             (0..self.layers).for_each(|layer| self.cache.copy_token(from + layer, to + layer, token));
         }
     }
 
     /// Final norm and projection of the new token's rows, which are the last ones of the pass.
-    fn read_out(&mut self, exec: &mut Exec, net: &FlowNet, gaze: bool) {
+    fn read_out(&mut self, exec: &mut Exec, net: &FlowNet, guided: bool) {
         let (d, latent, rows) = (net.config().width, net.latent(), self.rows.len());
-        let n = if self.branches == Branches::Guided && !gaze { 2 } else { self.branches.count() };
+        let n = if self.branches == Branches::Guided && !guided { 2 } else { self.branches.count() };
         let index = &self.mod_index[rows - n..];
         let (shift, scale) = self.modulation.last(index);
         exec.norm(&self.x[(rows - n) * d..rows * d], n, d, shift, scale, &mut self.tail[..n * d]);

@@ -89,7 +89,7 @@ impl<'e> Walker<'e> {
             self.condition.set_user(&positions);
         }
         if let Some(target) = scene.gaze {
-            self.condition.set_gaze(target);
+            self.condition.set_gaze(target, true);
         }
         let (seed, temperature) = (self.seed, c.session.temperature);
         let guidance = Guidance { weight: c.session.guidance, gaze: c.session.gaze_guidance };

@@ -1,15 +1,12 @@
 //! Putting a quantised bundle together.
 
 use super::layers::Layer;
-use crate::bundle::{BundleFile, CONFIG_KEY, StoredData, StoredWeights};
+use crate::bundle::{BundleFile, Entry, StoredData, StoredWeights, assemble, failed};
 use crate::config::Quantisation;
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::Result;
 use crate::kernels::{I4_GROUP, Scheme};
 use safetensors::Dtype;
-use safetensors::tensor::TensorView;
-use std::collections::{BTreeMap, HashMap};
-
-type Entry = (String, Dtype, Vec<usize>, Vec<u8>);
+use std::collections::BTreeMap;
 
 /// Puts weights in the place of those of `file` and records their schemes in its config.
 pub(super) fn bundle(file: &BundleFile<'_>, weights: &[(&Layer, StoredWeights)], asked: Scheme) -> Result<Vec<u8>> {
@@ -23,16 +20,9 @@ pub(super) fn bundle(file: &BundleFile<'_>, weights: &[(&Layer, StoredWeights)],
     let kept = tensors.iter().filter(|(name, _)| !record.tensors.contains_key(*name));
     entries.extend(kept.map(|(n, v)| (n.to_owned(), v.dtype(), v.shape().to_vec(), v.data().to_vec())));
 
-    let failed = |what: String| Error::new(ErrorKind::BundleInvalid, format!("cannot be written anew: {what}"));
-    let mut config: serde_json::Value = serde_json::from_str(&json).map_err(|e| failed(e.to_string()))?;
-    config["quantisation"] = serde_json::to_value(&record).map_err(|e| failed(e.to_string()))?;
-    let views = (entries.iter())
-        .map(|(name, dtype, shape, data)| Ok((name.as_str(), TensorView::new(*dtype, shape.clone(), data)?)))
-        .collect::<std::result::Result<Vec<_>, safetensors::SafeTensorError>>()
-        .map_err(|e| failed(e.to_string()))?;
-    // One entry of metadata: a map of more would be written in no fixed order.
-    let metadata = HashMap::from([(CONFIG_KEY.to_owned(), config.to_string())]);
-    safetensors::serialize(views, Some(metadata)).map_err(|e| failed(e.to_string()))
+    let mut config: serde_json::Value = serde_json::from_str(&json).map_err(failed)?;
+    config["quantisation"] = serde_json::to_value(&record).map_err(failed)?;
+    assemble(&config, &entries)
 }
 
 fn store(layer: &Layer, weights: &StoredWeights, entries: &mut Vec<Entry>) {

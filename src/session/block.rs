@@ -54,7 +54,7 @@ impl BlockState {
         let condition = Condition::absent(engine.layout());
         exec.begin();
         let mut generator = Generator::new(exec, engine.nets(), &condition, generator_options);
-        if options.gaze.is_some() {
+        if options.gaze_control.guides(options.gaze) {
             generator.open_gaze();
         }
         exec.end();
@@ -151,7 +151,7 @@ impl BlockState {
         mut probe: Option<&mut dyn Probe>,
     ) -> Result<()> {
         if plan.hold == Hold::No {
-            self.prepare(exec, engine, options, &mut probe)?;
+            self.prepare(exec, engine, options, plan, &mut probe)?;
             self.sample(exec, engine, options, plan, &mut probe);
             self.complete(exec, engine, options, plan, &mut probe)?;
         } else {
@@ -190,9 +190,12 @@ impl BlockState {
         exec: &mut Exec,
         engine: &Engine,
         options: &SessionOptions,
+        plan: &Plan,
         probe: &mut Option<&mut dyn Probe>,
     ) -> Result<()> {
-        self.inputs.prepare(exec, engine, self.block, &self.motion.root(), options.gaze, probe)
+        let config = engine.config.gaze.as_ref();
+        let gaze = options.gaze_control.cue(config, options.gaze, plan.sampler, options.seed, self.block);
+        self.inputs.prepare(exec, engine, self.block, &self.motion.root(), gaze, probe)
     }
 
     /// Makes the latent.

@@ -1,5 +1,6 @@
 //! From what was pushed to the conditioning of a block.
 
+use super::gaze::Cue;
 use super::probe::{Probe, tell};
 use super::stats::{Delays, InputStats};
 #[cfg(feature = "tract")]
@@ -174,7 +175,7 @@ impl Inputs {
         engine: &Engine,
         block: u64,
         root: &Root,
-        gaze: Option<f32>,
+        gaze: Option<Cue>,
         probe: &mut Option<&mut dyn Probe>,
     ) -> Result<()> {
         self.condition.clear();
@@ -190,8 +191,8 @@ impl Inputs {
             self.condition.set_user(&positions);
             tell(probe, block, "conditioning.user", &positions);
         }
-        if let Some(target) = gaze {
-            self.condition.set_gaze(target);
+        if let Some(Cue { value, guided }) = gaze {
+            self.condition.set_gaze(value, guided);
         }
         Ok(())
     }

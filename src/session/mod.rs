@@ -8,6 +8,7 @@
 //! |---|---|
 //! | `options` | what a session is made with |
 //! | `inputs` | voices and head positions to the conditioning of a block |
+//! | `gaze` | the wanted gaze to the gaze channel, free gaze included |
 //! | `block` | the computation of a block |
 //! | `anchor` | re-anchoring: encoding recent motion anew, spread over blocks |
 //! | `governor/` | quality traded for time, block by block |
@@ -20,6 +21,7 @@
 
 mod anchor;
 mod block;
+mod gaze;
 mod governor;
 mod inputs;
 mod options;
@@ -27,6 +29,7 @@ mod probe;
 mod stats;
 mod team;
 
+pub use gaze::GazeControl;
 pub use governor::{Budget, Decision, Governor, GovernorStats, Hold, Plan};
 pub use options::{Anchoring, HistoryTime, SessionOptions};
 pub use probe::Probe;
@@ -125,14 +128,15 @@ impl Session {
         Ok(())
     }
 
-    /// Sets the gaze target, 0 (averted) to 1 (sustained eye contact), or `None` for what the model finds natural.
+    /// Sets the gaze target, 0 (averted) to 1 (sustained eye contact), or `None` for free gaze: levels of recorded conversations,
+    /// another one every now and then, where the bundle was calibrated ([`GazeControl`]), else what the model finds natural.
     /// Takes effect with the next block. The first target takes the memory of its guidance branch, a copy of some megabytes.
     ///
     /// # Errors
     /// [`ErrorKind::Argument`] outside -1 to 1.
     pub fn set_gaze(&mut self, target: Option<f32>) -> Result<()> {
         options::check_gaze(target)?;
-        if target.is_some() {
+        if self.options.gaze_control.guides(target) {
             self.state.generator.open_gaze();
         }
         self.options.gaze = target;
@@ -221,7 +225,7 @@ impl Session {
         if let Some((plan, work, milliseconds)) = self.last.take() {
             policy.observe(&plan, milliseconds, work);
         }
-        let branches = if self.options.gaze.is_some() { 3 } else { 2 };
+        let branches = if self.options.gaze_control.guides(self.options.gaze) { 3 } else { 2 };
         let outlook = self.state.outlook(policy.ladder(), branches);
         let plan = policy.decide(&outlook);
         let rung = policy.ladder().iter().position(|s| *s == plan.sampler).unwrap_or(0);

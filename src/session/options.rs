@@ -1,6 +1,6 @@
 //! What a session is made with.
 
-use super::Governor;
+use super::{GazeControl, Governor};
 use crate::audio::AudioBackend;
 use crate::config::CleanHistory;
 use crate::engine::Engine;
@@ -52,6 +52,8 @@ pub struct SessionOptions {
     pub governor: Governor,
     /// Gaze target, -1 to 1, or `None` for free gaze.
     pub gaze: Option<f32>,
+    /// What the target, or its absence, means to the network.
+    pub gaze_control: GazeControl,
     /// Guidance weight, 0 to 20; `None` for the bundle's.
     pub guidance: Option<f32>,
     /// Gaze guidance weight, 0 to 20; `None` for the bundle's.
@@ -89,6 +91,7 @@ impl Default for SessionOptions {
             sampler: Sampler::Midpoint(4),
             governor: Governor::Off,
             gaze: None,
+            gaze_control: GazeControl::Calibrated,
             guidance: None,
             gaze_guidance: None,
             temperature: None,

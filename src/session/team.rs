@@ -136,7 +136,7 @@ impl Team {
             if alone {
                 keep(state.compute(exec, engine, options, &due.plan, None));
                 *member = None;
-            } else if keep(state.prepare(exec, engine, options, &mut None)) {
+            } else if keep(state.prepare(exec, engine, options, &due.plan, &mut None)) {
                 state.begin_shared(engine, options, &due.plan);
             } else {
                 *member = None;
@@ -181,7 +181,7 @@ fn gather<'a, 's>(sessions: &'a mut [(&'s mut Session, f64)]) -> Option<[Option<
 impl Session {
     /// Rows of a shared pass that the block of `plan` takes; `None` where it cannot share one.
     fn shared_rows(&self, plan: &Plan) -> Option<usize> {
-        let rows = self.state.generator.rows(plan.sampler, self.options.gaze.is_some())?;
+        let rows = self.state.generator.rows(plan.sampler, self.options.gaze_control.guides(self.options.gaze))?;
         (plan.hold == Hold::No).then_some(rows)
     }
 }

@@ -1,0 +1,41 @@
+//! A bundle's file put together anew.
+
+use super::{BundleFile, CONFIG_KEY};
+use crate::config::GazeConfig;
+use crate::error::{Error, ErrorKind, Result};
+use safetensors::Dtype;
+use safetensors::tensor::TensorView;
+use std::collections::HashMap;
+
+/// A tensor's name, type, shape and bytes.
+pub(crate) type Entry = (String, Dtype, Vec<usize>, Vec<u8>);
+
+/// The bytes of a bundle of these tensors. Same config and tensors, same bytes.
+pub(crate) fn assemble(config: &serde_json::Value, entries: &[Entry]) -> Result<Vec<u8>> {
+    let views = (entries.iter())
+        .map(|(name, dtype, shape, data)| Ok((name.as_str(), TensorView::new(*dtype, shape.clone(), data)?)))
+        .collect::<std::result::Result<Vec<_>, safetensors::SafeTensorError>>()
+        .map_err(failed)?;
+    // One entry of metadata: a map of more would be written in no fixed order.
+    let metadata = HashMap::from([(CONFIG_KEY.to_owned(), config.to_string())]);
+    safetensors::serialize(views, Some(metadata)).map_err(failed)
+}
+
+/// [`ErrorKind::BundleInvalid`] for whatever keeps a bundle from being written anew.
+pub(crate) fn failed(what: impl std::fmt::Display) -> Error {
+    Error::new(ErrorKind::BundleInvalid, format!("cannot be written anew: {what}"))
+}
+
+impl BundleFile<'_> {
+    /// The bytes of this bundle with another calibration of its gaze; all else stays.
+    ///
+    /// # Errors
+    /// [`ErrorKind::BundleCorrupt`] or [`ErrorKind::BundleInvalid`].
+    pub fn with_gaze(&self, gaze: &GazeConfig) -> Result<Vec<u8>> {
+        let (json, tensors) = self.raw()?;
+        let mut config: serde_json::Value = serde_json::from_str(&json).map_err(failed)?;
+        config["gaze"] = serde_json::to_value(gaze).map_err(failed)?;
+        let entries = tensors.iter().map(|(n, v)| (n.to_owned(), v.dtype(), v.shape().to_vec(), v.data().to_vec()));
+        assemble(&config, &entries.collect::<Vec<_>>())
+    }
+}
