@@ -14,7 +14,7 @@ use crate::session::{GazeControl, SessionOptions};
 use std::sync::Arc;
 
 /// Values of the channel at which the model's gaze is measured.
-const CHANNEL: [f32; 9] = [-0.6, -0.35, -0.1, 0.1, 0.3, 0.5, 0.65, 0.8, 1.0];
+const CHANNEL: [f32; 7] = [-0.6, -0.3, 0.0, 0.25, 0.5, 0.75, 1.0];
 /// Evenly spaced quantiles of the clips' gaze that are kept.
 const LEVELS: usize = 17;
 
