@@ -79,8 +79,10 @@ impl Size {
                 temperature: 0.75,
                 clean_history: None,
                 bridge: 0.8,
-                anchor_period: 90,
-                anchor_radius: 8.0,
+                // A round takes about a window of blocks; between two of them there are blocks without.
+                anchor_period: 4 * flow.window_blocks as u32,
+                // The motion of seeded weights goes anywhere: where to says nothing.
+                anchor_radius: 1e6,
             },
             gaze: None,
             quantisation: None,
