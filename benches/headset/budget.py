@@ -17,7 +17,8 @@ CPU = {"dotprod": "cortex-a76", "i8mm": "max,sve=off,sme=off"}
 RUNS = {"base": 14, "paper": 5}  # blocks counted of a run
 SAMPLERS = ("midpoint4", "midpoint2", "single")
 IDLE = 16  # blocks of idle clip: the decoder's window is full from the start
-FPS, BLOCK = 30, 4
+ASSUMED = 1.5  # instructions a clock
+TIME = 4 / 30 * 2 / 3  # seconds that a block may take: two thirds of one core
 
 
 def bundle(folder, size, scheme):
@@ -73,12 +74,13 @@ def main():
                         with open(path, "w") as f:
                             json.dump(known, f, indent=1)
                         print(f"counted {key}", file=sys.stderr, flush=True)
-    print(table(known))
+    print(table(known), projection(known), sep="\n\n")
 
 
 def table(known):
-    """A row a size, scheme and sampler: what a block takes, and what 30 fps on two thirds of a core ask for."""
-    lines = ["| size, scheme, sampler | weights, MB | caches, MB | int8 MAC, M | instructions, M: dotprod | i8mm | bandwidth, GB/s |", "|---|---|---|---|---|---|---|"]
+    """A row a size, scheme and sampler: what a block takes, and what it asks of one core that has a third to spare."""
+    lines = ["| size, scheme, sampler | weights, MB | caches, MB | int8 MAC, M | instructions, M: dotprod | i8mm | GHz x instructions a clock: dotprod | i8mm | GB/s |",
+             "|---|---|---|---|---|---|---|---|---|"]
     for size in RUNS:
         for scheme in ("i8", "i4"):
             for sampler in SAMPLERS:
@@ -87,9 +89,20 @@ def table(known):
                     continue
                 dot, mm = (at_full_window(rows[level]) for level in CPU)
                 r = rows["dotprod"]
-                traffic = r["weight_bytes"] + cache_bytes(r)
-                lines.append(f"| {size}, {scheme}, {sampler} | {r['weight_bytes'] / 1e6:.1f} | {cache_bytes(r) / 1e6:.1f} | {dot[1] / 1e6:.0f} | {dot[0] / 1e6:.1f} "
-                             f"| {mm[0] / 1e6:.1f} | {traffic * FPS / BLOCK / 1e9:.2f} |")
+                lines.append(f"| {size}, {scheme}, {sampler} | {r['weight_bytes'] / 1e6:.1f} | {cache_bytes(r) / 1e6:.1f} | {dot[1] / 1e6:.0f} | {dot[0] / 1e6:.1f} | {mm[0] / 1e6:.1f} "
+                             f"| {dot[0] / TIME / 1e9:.2f} | {mm[0] / TIME / 1e9:.2f} | {(r['weight_bytes'] + cache_bytes(r)) / TIME / 1e9:.2f} |")
+    return "\n".join(lines)
+
+
+def projection(known):
+    """Share of one core for a block, dotprod kernels: assumed instructions a clock, published clock and factors (docs/headset-budget.md)."""
+    cores = {"XR2 Gen 1": 2.42e9, "XR2 Gen 2": 1.33 * 2.42e9, "XR2+ Gen 2": 1.2 * 1.33 * 2.42e9}
+    lines = [f"| share of one core | {' | '.join(cores)} | memory, GB/s, on average |", "|---|" + "---|" * (len(cores) + 1)]
+    for key, r in known.items():
+        size, scheme, sampler, level = key.split()
+        if level == "dotprod":
+            shares = [f"{100 * at_full_window(r)[0] / (ASSUMED * hertz) / (4 / 30):.0f} %" for hertz in cores.values()]
+            lines.append(f"| {size}, {scheme}, {sampler} | {' | '.join(shares)} | {(r['weight_bytes'] + cache_bytes(r)) / (4 / 30) / 1e9:.2f} |")
     return "\n".join(lines)
 
 

@@ -1,6 +1,7 @@
 """ggml through ggml-python, built for this machine's instructions: weights in Q8_0 or Q4_0, in the buffer type that repacks them for it."""
 import ctypes
 import os
+import sys
 
 import ggml as g
 import numpy as np
@@ -61,37 +62,42 @@ class Context:
 
 
 class Weights:
+    """All weights; matrices that the repacking buffer has a kernel for lie there, the others, of the same type, in plain memory."""
+
     def __init__(self, path, kind):
         self.backend = g.ggml_backend_cpu_init()
-        packed, plain = Context(400), Context(400)
-        self.kept, self.at, later = [], {}, []
-        for name, value in load_file(path).items():
-            name, *shape = name.split(":")
-            if shape:
-                self.at[name] = packed.new(int(shape[1]), int(shape[0]), kind=kind)
-                later.append((self.at[name], value))
-            else:
-                self.kept.append(value)
-                self.at[name] = plain.over(value, *value.shape[::-1])
-        self.name, buffer = self.repacking(packed)
-        for tensor, value in later:
-            g.ggml_backend_tensor_set(tensor, value.ctypes.data, 0, value.nbytes)
-        self.contexts = packed, plain, buffer
+        stored = [(*key.split(":"), value) for key, value in load_file(path).items()]
+        matrices = [(name, int(rows), int(columns), value) for name, rows, columns, value in (s for s in stored if len(s) == 4)]
+        extra, trial = self.extra(), Context(400)
+        tensors = [trial.new(columns, rows, kind=kind) for _, rows, columns, _ in matrices]
+        buffer = g.ggml_backend_alloc_ctx_tensors_from_buft(trial.c, extra) if extra else None
+        fits = [bool(extra and t.contents.extra) for t in tensors]
+        if buffer:
+            g.ggml_backend_buffer_free(buffer)
+        plain = Context(800)
+        packed = Context(400)
+        self.at = {name: (packed if fit else plain).new(columns, rows, kind=kind) for (name, rows, columns, _), fit in zip(matrices, fits)}
+        self.buffers = [g.ggml_backend_alloc_ctx_tensors(plain.c, self.backend)] if not all(fits) else []
+        self.buffers += [g.ggml_backend_alloc_ctx_tensors_from_buft(packed.c, extra)] if any(fits) else []
+        for name, _, _, value in matrices:
+            g.ggml_backend_tensor_set(self.at[name], value.ctypes.data, 0, value.nbytes)
+        self.kept = [s[1] for s in stored if len(s) == 2]
+        self.at |= {s[0]: plain.over(s[1], *s[1].shape[::-1]) for s in stored if len(s) == 2}
+        self.contexts = packed, plain
+        print(f"{sum(fits)} of {len(fits)} matrices repacked", file=sys.stderr)
 
     @staticmethod
-    def repacking(context):
-        """A buffer for the tensors of the wanted extra type (GGML_PEER_BUFFER), CPU_REPACK by default; plain where there is none."""
-        want = os.environ.get("GGML_PEER_BUFFER", "CPU_REPACK")
+    def extra():
+        """The extra buffer type that is wanted (GGML_PEER_BUFFER, CPU_REPACK by default), if there is one."""
         device = g.ggml_backend_reg_dev_get(g.ggml_backend_cpu_reg(), 0)
         address = g.ggml_backend_reg_get_proc_address(g.ggml_backend_cpu_reg(), b"ggml_backend_dev_get_extra_bufts")
-        types = ctypes.CFUNCTYPE(ctypes.POINTER(ctypes.c_void_p), ctypes.c_void_p)(address)(device) if address else []
+        types = ctypes.CFUNCTYPE(ctypes.POINTER(ctypes.c_void_p), ctypes.c_void_p)(address)(device) if address else [None]
         i = 0
-        while types and types[i]:
-            name = g.ggml_backend_buft_name(types[i]).decode()
-            if name == want:
-                return name, g.ggml_backend_alloc_ctx_tensors_from_buft(context.c, types[i])
+        while types[i]:
+            if g.ggml_backend_buft_name(types[i]).decode() == os.environ.get("GGML_PEER_BUFFER", "CPU_REPACK"):
+                return types[i]
             i += 1
-        return "CPU", g.ggml_backend_alloc_ctx_tensors(context.c, g.ggml_backend_cpu_init())
+        return None
 
 
 class Graph:
