@@ -6,7 +6,7 @@
 //!
 //! | verdict | holds when |
 //! |---|---|
-//! | memory | resident memory does not grow by more than 1 % over what it was in the second and third tenth of the run |
+//! | memory | resident memory, pages of files excepted, does not grow by more than 1 % over what it was in the second and third tenth of the run; a quarter of an hour is the least that says something, since voices fill their rings for a minute |
 //! | allocations | computing a block allocates nothing after the first cycle's tenth (where the caller can count) |
 //! | each metric (soaks of half an hour and more) | over the last ten minutes within 15 % of the first ten; the supporting foot's speed within 15 % of 2 cm/s where it is lower |
 //! | period | the same noise and inputs 2^24 blocks (26 days) later give the same motion, bit for bit, over 40 blocks |
