@@ -155,8 +155,7 @@ impl Engine {
     }
 
     fn build(config: Config, t: &Tensors<'_>, kernels: Kernels, networks: Networks) -> Result<Self> {
-        let student = networks.student && config.student.is_some();
-        if !networks.reference && !student {
+        if !networks.reference && !(networks.student && config.student.is_some()) {
             let message =
                 "no network to make motion with: load the reference network, or the student of a bundle that has one";
             return Err(Error::new(ErrorKind::Argument, message));
@@ -178,6 +177,8 @@ impl Engine {
             }
             FlowNet::load(t, kernels, &config.flow, latent, layout, prefix).map(Some)
         };
+        // Tensors of a student that the config does not have are not skipped: they are an error.
+        let student = if config.student.is_some() { net("student", networks.student)? } else { None };
         let audio_source = AudioSource::load(t, &config.audio)?;
         let encoder = Encoder::load(t, kernels, &config.vae, features)?;
         let mut engine = Self {
@@ -185,7 +186,7 @@ impl Engine {
             encoder: None,
             decoder: Decoder::load(t, kernels, &config.vae, features)?,
             flow: net("flow", networks.reference)?,
-            student: net("student", student)?,
+            student,
             pose: Standard::load(t, "stats.pose", features)?,
             latent: Standard::load(t, "stats.latent", latent)?,
             idle: Vec::new(),
