@@ -155,7 +155,8 @@ impl Engine {
     }
 
     fn build(config: Config, t: &Tensors<'_>, kernels: Kernels, networks: Networks) -> Result<Self> {
-        if !networks.reference && !(networks.student && config.student.is_some()) {
+        let some = networks.reference || networks.student && config.student.is_some();
+        if !some {
             let message =
                 "no network to make motion with: load the reference network, or the student of a bundle that has one";
             return Err(Error::new(ErrorKind::Argument, message));

@@ -89,7 +89,7 @@ fn gaze(g: &GazeConfig) -> Result<()> {
             real(&format!("gaze.{name}"), *value, -1.0, 1.0)?;
         }
         if points.windows(2).any(|pair| pair[1][0] <= pair[0][0] || pair[1][1] <= pair[0][1]) {
-            return Err(invalid(&format!("gaze.{name}: scores and channel values must both ascend")));
+            return Err(invalid(format!("gaze.{name}: scores and channel values must both ascend")));
         }
     }
     within("gaze.levels", g.levels.len(), 1, 1024)?;
