@@ -131,7 +131,12 @@ impl Caller {
                     let options = if null { std::ptr::null() } else { given.as_ptr().cast() };
                     visavis_session_new(self.engine, options, &mut self.own)
                 }
-                Call::New { .. } => visavis_session_new(null(), null(), &mut self.own),
+                Call::New { .. } => {
+                    let mut none = self.own;
+                    let status = visavis_session_new(null(), null(), &mut none);
+                    assert!(none.is_null() && status == VisavisStatus::Argument);
+                    status
+                }
                 Call::Defaults { size } => {
                     let mut room = [u64::from_ne_bytes([CANARY; 8]); 32];
                     let status = visavis_session_options_init(room.as_mut_ptr().cast(), usize::from(size));
@@ -142,6 +147,7 @@ impl Caller {
                     visavis_session_free(self.own);
                     self.own = null_mut();
                     visavis_session_free(null_mut());
+                    visavis_engine_free(null_mut());
                     VisavisStatus::Ok
                 }
                 Call::Sound { agent, len, rate, value, pointer: how } => {
@@ -213,7 +219,6 @@ impl Caller {
                     let data = if null { std::ptr::null() } else { part.as_ptr() };
                     let status = visavis_engine_from_memory(data, part.len(), &mut engine);
                     assert!(engine.is_null() && status != VisavisStatus::Ok);
-                    visavis_engine_free(engine);
                     status
                 }
                 Call::Path(mut name) => {
