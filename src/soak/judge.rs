@@ -15,7 +15,7 @@ const DRIFT_HOURS: f64 = 0.5;
 const SUPPORT: f64 = 0.02;
 /// Seam metric at switches of the sampler that is allowed.
 const SWITCH_SEAM: f64 = 1.2;
-/// Distance by which a day of token indices may move a joint of one block, metres.
+/// Distance by which a day of token indices may move joints of one block, root mean square, metres.
 const PRECISION: f64 = 0.005;
 /// How often what a few tokens change a day may change; means of eight places under eight noises differ by a tenth by chance.
 const DAY: f64 = 1.5;
@@ -140,14 +140,15 @@ pub(super) fn report(soak: &Soak, measured: Measured) -> Report {
         hours.period_blocks as f64 * BLOCK_FRAMES as f64 / f64::from(FPS) / 86_400.0
     );
     judge("period", hours.period_frames_that_differ == 0, detail);
+    let ([day, day_most], [tokens, tokens_most]) = (hours.day_later, hours.tokens_later);
     let detail = format!(
-        "a block a day later moves by {:.4} mm, some tokens later by {:.4} mm; at most {:.4} mm",
-        1000.0 * hours.day_later,
-        1000.0 * hours.tokens_later,
-        1000.0 * hours.day_later_most
+        "a block a day later moves by {:.3} mm (most {:.2}), some tokens later by {:.3} mm (most {:.2})",
+        1000.0 * day,
+        1000.0 * day_most,
+        1000.0 * tokens,
+        1000.0 * tokens_most
     );
-    let alike = hours.day_later <= DAY * hours.tokens_later;
-    judge("precision", alike && hours.day_later_most <= PRECISION, detail);
+    judge("precision", day <= DAY * tokens && day <= PRECISION, detail);
     if let Some(seam) = switches {
         judge("switches", seam <= SWITCH_SEAM, format!("seam metric {seam:.2} where the sampler changes"));
     }
