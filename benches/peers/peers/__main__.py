@@ -3,6 +3,7 @@
     python -m peers prepare --dir DIR [--only NAMES]     weights, ONNX files, quantised files, inputs, our f32 reference
     python -m peers check   --dir DIR [--only NAMES]     outputs of everyone against our f32
     python -m peers time    --dir DIR [--only NAMES] [--threads 1,2] [--seconds S]   interleaved; appends to DIR/times.json
+    python -m peers grow    --dir DIR [--threads 2]      our block time against sizes, branches and sessions
     python -m peers table   --dir DIR [--out TABLE.md]   text, Markdown and DIR/table.json of all that was measured
 """
 import argparse
@@ -10,7 +11,7 @@ import json
 import os
 import subprocess
 
-from . import driver, table
+from . import driver, growth, table
 
 
 def ours(*args):
@@ -50,14 +51,14 @@ def prepare(args):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["prepare", "check", "time", "table"])
+    parser.add_argument("what", choices=["prepare", "check", "time", "table", "grow"])
     parser.add_argument("--dir", required=True)
     parser.add_argument("--only", default="", help="names or beginnings of names, by comma")
     parser.add_argument("--threads", default="1,2")
     parser.add_argument("--seconds", type=float, default=40, help="of measuring, for each number of threads")
     parser.add_argument("--out")
     args = parser.parse_args()
-    {"prepare": prepare, "check": driver.check, "time": driver.time_all, "table": table.write}[args.what](args)
+    {"prepare": prepare, "check": driver.check, "time": driver.time_all, "table": table.write, "grow": growth.measure}[args.what](args)
 
 
 if __name__ == "__main__":

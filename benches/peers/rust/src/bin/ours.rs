@@ -5,6 +5,7 @@
 //! ours quantize IN OUT SCHEME                    a bundle of floats to f16, i8 or i4, each weight to the nearest value
 //! ours trace BUNDLE IN OUT                        every stage of a run, f32 caches: the reference
 //! ours count BUNDLE SAMPLER BLOCKS                whole blocks between markers of benches/headset/insn.c; bytes of each on stdout, JSON
+//! ours grow BUNDLE THREADS SESSIONS GAZE WARM BLOCKS   times of whole blocks of sessions stepped together, ms as JSON; GAZE 1: three branches
 //! ours serve BUNDLE IN THREADS SAMPLER [f32]      a worker; times are of projecting the conditioning, flow and decoder
 //! ```
 
@@ -42,6 +43,10 @@ fn main() -> Result<()> {
             Ok(trace(&engine, &input, plain(KvDtype::F32))?.write(out)?)
         }
         ["count", bundle, sampler, blocks] => count(bundle, sampler.parse()?, blocks.parse()?),
+        ["grow", bundle, ref numbers @ ..] if numbers.len() == 5 => {
+            let numbers = numbers.iter().map(|n| n.parse()).collect::<std::result::Result<Vec<usize>, _>>()?;
+            grow(bundle, &numbers)
+        }
         ["serve", bundle, input, threads, sampler, ref cache @ ..] => {
             let engine = Engine::load(bundle)?;
             let input = TraceInput::read(input, &engine)?;
@@ -52,7 +57,7 @@ fn main() -> Result<()> {
         }
         _ => {
             Err("usage: ours config SIZE | quantize IN OUT SCHEME | trace BUNDLE IN OUT | count BUNDLE SAMPLER BLOCKS \
-              | serve BUNDLE IN THREADS SAMPLER [f32]"
+              | grow BUNDLE THREADS SESSIONS GAZE WARM BLOCKS | serve BUNDLE IN THREADS SAMPLER [f32]"
                 .into())
         }
     }
@@ -81,6 +86,38 @@ fn count(bundle: &str, sampler: Sampler, blocks: usize) -> Result<()> {
             "evaluations": sampler.evaluations(), "weight_bytes": engine.block_bytes(sampler), "flow": config.flow, "vae": config.vae,
         })
     );
+    Ok(())
+}
+
+/// `numbers`: threads, sessions, whether there is a gaze target, blocks before any is timed, blocks that are.
+fn grow(bundle: &str, numbers: &[usize]) -> Result<()> {
+    let [threads, sessions, gaze, warm, blocks] = numbers else { return Err("five numbers".into()) };
+    let engine = Engine::load(bundle)?;
+    let options = |seed| SessionOptions {
+        seed,
+        gaze: (*gaze > 0).then_some(0.5),
+        anchoring: Anchoring::Never,
+        ..SessionOptions::default()
+    };
+    let mut sessions = (0..*sessions as u64).map(|i| Ok(engine.session(options(i))?)).collect::<Result<Vec<_>>>()?;
+    let mut team = engine.team(*threads)?;
+    let mut times = Vec::with_capacity(*blocks);
+    for block in 0..warm + blocks {
+        let mut due = Vec::with_capacity(sessions.len());
+        for session in &mut sessions {
+            let now = session.next_due();
+            session.push_user_head(Vec3::new(1.5 * now.sin() as f32, 1.65, 1.5), now)?;
+            session.push_agent_audio(&[0.1; 3200], 24_000)?;
+            session.push_user_audio(&[0.1; 3200], 24_000)?;
+            due.push((session, now));
+        }
+        let started = Instant::now();
+        team.step(&mut due)?;
+        if block >= *warm {
+            times.push(1000.0 * started.elapsed().as_secs_f64());
+        }
+    }
+    println!("{}", serde_json::json!({ "ms": times }));
     Ok(())
 }
 
