@@ -7,8 +7,8 @@
 #   realtime  RealtimeSanitizer: every block of the real-time tests, where any allocation, lock or blocking call is fatal but the
 #             yield that tests/rtsan.supp names
 #
-# No nightly toolchain: flags that stable compilers accept with RUSTC_BOOTSTRAP. `kernels` (address) is the part that .ci/run has
-# time for; `full` runs all tests of the library and of tests/ but those that put processes under limits of their own. A toolchain
+# No nightly toolchain: flags that stable compilers accept with RUSTC_BOOTSTRAP. `kernels` (address) is the shortest part;
+# `full` runs all tests of the library and of tests/ but those that put processes under limits of their own. A toolchain
 # without the sanitizer's runtime is skipped with a note.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
