@@ -181,6 +181,14 @@ pub struct GazeConfig {
     pub seconds: f32,
 }
 
+impl GazeConfig {
+    /// The curves that there are, by name.
+    pub fn curves(&self) -> impl Iterator<Item = (&'static str, &GazeCurve)> {
+        let student = self.student.iter().map(|curve| ("student", curve));
+        [("guided", &self.guided), ("unguided", &self.unguided)].into_iter().chain(student)
+    }
+}
+
 /// Pairs of a mean gaze score and the channel's value that brings it about, both ascending; linear between, constant beyond.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]

@@ -81,9 +81,7 @@ pub(super) fn config(c: &Config) -> Result<()> {
 
 /// Checks what was measured of the gaze channel.
 fn gaze(g: &GazeConfig) -> Result<()> {
-    for (name, curve) in [("guided", Some(&g.guided)), ("unguided", Some(&g.unguided)), ("student", g.student.as_ref())]
-    {
-        let Some(GazeCurve(points)) = curve else { continue };
+    for (name, GazeCurve(points)) in g.curves() {
         within(&format!("gaze.{name}"), points.len(), 1, 64)?;
         for value in points.as_flattened() {
             real(&format!("gaze.{name}"), *value, -1.0, 1.0)?;

@@ -48,11 +48,8 @@ pub fn run(args: &CalibrateArgs) -> Result<()> {
 
 fn summary(args: &CalibrateArgs, gaze: &GazeConfig) -> String {
     let mut text = format!("{}\n", args.output.display());
-    let curves =
-        [("guided", Some(&gaze.guided)), ("unguided", Some(&gaze.unguided)), ("student", gaze.student.as_ref())];
     // Writing to a string does not fail.
-    for (name, curve) in curves {
-        let Some(GazeCurve(points)) = curve else { continue };
+    for (name, GazeCurve(points)) in gaze.curves() {
         let points: Vec<_> = points.iter().map(|[score, channel]| format!("{channel:.2}: {score:.2}")).collect();
         let _ = writeln!(text, "  {name:<9} channel: gaze score   {}", points.join("  "));
     }
