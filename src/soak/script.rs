@@ -47,7 +47,7 @@ pub(super) struct Script<'a> {
     sampler: Sampler,
     student: bool,
     cycle: u64,
-    /// Samples pushed so far of each voice, in seconds of its line.
+    /// Seconds of each voice pushed so far in this cycle.
     spoken: [f64; 2],
     samples: Vec<f32>,
     user: Option<Vec3>,
@@ -91,6 +91,10 @@ impl<'a> Script<'a> {
     pub(super) fn block(&mut self, session: &mut Session, block: u64) -> Result<()> {
         // Place in the cycle, 0 to 1, and in time.
         let at = (block % self.cycle) as f64 / self.cycle as f64;
+        if block.is_multiple_of(self.cycle) {
+            // Each cycle says the same where it does the same, so that cycles can be compared.
+            self.spoken = [0.0; 2];
+        }
         let part = (at * 20.0) as u64;
         if self.part.replace(part) != Some(part) {
             session.set_gaze(GAZES[part as usize % GAZES.len()])?;
