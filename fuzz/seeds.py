@@ -44,9 +44,8 @@ seed("csv", "spreadsheet", "\ufefft,x,y,z\r\n0,1,1.6,-2\r\n\r\n5e-1,2,1.5,0\r\n"
 seed("csv", "wrong", b"t,x,y,z\n0,nan,1e400,2\n-1,,0,inf\n")
 
 header = 8 + struct.unpack("<Q", tiny[:8])[0]
-seed("bundle_bytes", "whole", tiny)
+# A whole one, the small bundle, the target writes itself.
 seed("bundle_bytes", "header", tiny[:header])
-seed("bundle_bytes", "cut", tiny[: len(tiny) // 2])
 seed("bundle_bytes", "length", b"\xff" * 8 + b"{}")
 seed("bundle_bytes", "empty-container", struct.pack("<Q", 2) + b"{}")
 

@@ -48,8 +48,12 @@ fuzz_target!(|data: &[u8]| {
     let Ok(lies) = Vec::<Lie>::arbitrary(&mut u) else { return };
     let bytes = tell(&lies[..lies.len().min(4)]);
     let Ok(engine) = Engine::from_slice(&bytes, "fuzz") else { return };
-    // One evaluation of one of the two networks.
-    let sampler = if data.len() % 2 == 0 { Sampler::Single } else { Sampler::Euler(1) };
+    // One evaluation of one of the two networks, for every other input: most lies are found out before, and loading is what they are for.
+    let sampler = match data.len() % 4 {
+        0 => Sampler::Single,
+        1 => Sampler::Euler(1),
+        _ => return,
+    };
     let Ok(mut session) = engine.session(SessionOptions { sampler, ..Default::default() }) else { return };
     for _ in 0..2 {
         let frames = session.poll(session.next_due()).expect("guarded").expect("due");

@@ -4,8 +4,10 @@ use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, OnceLock};
-use visavis::bundle::CONFIG_KEY;
-use visavis::engine::Engine;
+use visavis::bundle::{BundleFile, CONFIG_KEY};
+use visavis::engine::{Engine, Networks};
+use visavis::kernels::Kernels;
+use visavis::pose::feature_count;
 
 /// The bundle of the tests: the real networks with few channels and random weights.
 pub const TINY: &[u8] = include_bytes!("../../tests/goldens/tiny.safetensors");
@@ -38,7 +40,21 @@ impl Parts {
     }
 }
 
-/// A bundle that costs little: the tiny one with one layer a network, windows of two blocks and an idle clip of one.
+/// Joints of the small bundle: those that a rig needs, and legs for the stance.
+const JOINTS: [&str; 10] = [
+    "hips",
+    "head",
+    "leftHand",
+    "rightHand",
+    "leftUpperLeg",
+    "leftLowerLeg",
+    "leftFoot",
+    "rightUpperLeg",
+    "rightLowerLeg",
+    "rightFoot",
+];
+
+/// A bundle that costs little: the tiny one with ten joints, one layer a network, windows of two blocks and an idle clip of one.
 pub fn small() -> &'static Parts {
     static PARTS: OnceLock<Parts> = OnceLock::new();
     PARTS.get_or_init(make_small)
@@ -50,10 +66,28 @@ pub fn small_bundle() -> &'static [u8] {
     BYTES.get_or_init(|| small().bytes().expect("a container"))
 }
 
+/// Writes [`small`] to the seeds of the target that takes bundles as files.
+pub fn seed_small() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/corpus/bundle_bytes");
+    // Without the folder, as where one input is replayed elsewhere, nobody misses the seed.
+    let _ = std::fs::write(format!("{folder}/small"), small_bundle());
+}
+
 /// The engine of [`small`], loaded once.
 pub fn engine() -> Arc<Engine> {
     static ENGINE: OnceLock<Arc<Engine>> = OnceLock::new();
     Arc::clone(ENGINE.get_or_init(|| Engine::from_slice(small_bundle(), "small").expect("the small bundle loads")))
+}
+
+/// The same with the student alone, whose sessions start and compute in a fraction of the time.
+pub fn student() -> Arc<Engine> {
+    static ENGINE: OnceLock<Arc<Engine>> = OnceLock::new();
+    Arc::clone(ENGINE.get_or_init(|| {
+        let file = BundleFile::from_slice(small_bundle(), "small");
+        let networks = Networks { reference: false, ..Networks::default() };
+        let kernels = Kernels::detect().expect("a level");
+        Engine::from_file_with(&file, kernels, networks).expect("the small bundle loads")
+    }))
 }
 
 fn make_small() -> Parts {
@@ -72,5 +106,29 @@ fn make_small() -> Parts {
         shape[0] = 4;
         data.truncate(4 * row);
     }
+    fewer_joints(&mut parts);
     parts
+}
+
+/// Leaves [`JOINTS`], and of everything that is as wide as the features so much as they need: the weights are random anyway.
+fn fewer_joints(parts: &mut Parts) {
+    let joints = parts.config["rig"]["joints"].as_array_mut().expect("joints");
+    let wide = feature_count(joints.len());
+    joints.retain(|joint| JOINTS.iter().any(|name| joint["name"] == *name));
+    let narrow = feature_count(joints.len());
+    // A limb's joints follow each other; whatever else comes hangs on the hips.
+    for j in 1..joints.len() {
+        let limb = joints[j]["name"].as_str().is_some_and(|name| name.ends_with("LowerLeg") || name.ends_with("Foot"));
+        joints[j]["parent"] = if limb { j - 1 } else { 0 }.into();
+    }
+    for (_, shape, data) in parts.tensors.values_mut() {
+        if shape.first() == Some(&wide) {
+            data.truncate(data.len() / wide * narrow);
+            shape[0] = narrow;
+        } else if shape.last() == Some(&wide) {
+            let size = data.len() / shape.iter().product::<usize>();
+            *data = data.chunks_exact(wide * size).flat_map(|row| &row[..narrow * size]).copied().collect();
+            *shape.last_mut().expect("an axis") = narrow;
+        }
+    }
 }
