@@ -16,9 +16,11 @@ use std::sync::Arc;
 
 /// Sessions that are averaged.
 const RUNS: usize = 4;
+/// The gaze target of a long run: free gaze changes its level by chance every few seconds, which would pass for drift.
+const GAZE: f32 = 0.8;
 
 /// Metrics of the last period of a long run against those of the first: the same voices and the same way of the user come again
-/// in each period, so that only the agent can change.
+/// in each period and the gaze target is the same throughout, so that only the agent can change.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Endurance {
     /// Length of a period, seconds.
@@ -93,7 +95,8 @@ impl Endurance {
         let results = each(threads, runs, &|_| {}, &|run| {
             let voices = voices(windows, run, length).map(|voice| Some(voice.repeat(periods)));
             let user: Vec<Vec3> = (0..length * periods).map(|i| circling(i % length, length)).collect();
-            let options = SessionOptions { start: Root::default(), seed: run as u64, ..options.clone() };
+            let options =
+                SessionOptions { start: Root::default(), seed: run as u64, gaze: Some(GAZE), ..options.clone() };
             let outcome = generate(engine, options, voices, user)?;
             Ok(Run { guard: outcome.stats.guard, ..Run::of(&outcome.recording, length) })
         })?;

@@ -28,11 +28,7 @@ impl Window {
     /// # Errors
     /// Those of [`Clip::read`]; [`ErrorKind::Argument`] when no clip is long enough.
     pub fn choose(clips: &[Clip], count: usize) -> Result<Vec<Self>> {
-        let all: Vec<(usize, usize)> = clips
-            .iter()
-            .enumerate()
-            .flat_map(|(c, clip)| (0..clip.frames() / (LEAD + WINDOW)).map(move |i| (c, i * (LEAD + WINDOW))))
-            .collect();
+        let all: Vec<_> = Self::places(clips).collect();
         if all.is_empty() || count == 0 {
             let message = format!("no clip has the {} frames ({} s) of a window", LEAD + WINDOW, (LEAD + WINDOW) / 30);
             return Err(Error::new(ErrorKind::Argument, message));
@@ -40,6 +36,20 @@ impl Window {
         let count = count.min(all.len());
         let chosen = (0..count).map(|i| all[(2 * i + 1) * all.len() / (2 * count)]);
         chosen.map(|(c, from)| Self::read(&clips[c], c, from)).collect()
+    }
+
+    /// Every window of `clips`, read one after the other.
+    ///
+    /// # Errors
+    /// Those of [`Clip::read`].
+    pub fn every(clips: &[Clip]) -> impl Iterator<Item = Result<Self>> {
+        Self::places(clips).map(|(c, from)| Self::read(&clips[c], c, from))
+    }
+
+    /// Clip and first frame of every window.
+    fn places(clips: &[Clip]) -> impl Iterator<Item = (usize, usize)> {
+        let length = LEAD + WINDOW;
+        (clips.iter().enumerate()).flat_map(move |(c, clip)| (0..clip.frames() / length).map(move |i| (c, i * length)))
     }
 
     fn read(clip: &Clip, index: usize, from: usize) -> Result<Self> {
