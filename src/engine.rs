@@ -42,7 +42,7 @@ impl Default for Networks {
 /// use visavis::engine::Engine;
 /// use visavis::session::SessionOptions;
 ///
-/// let engine = Engine::load("models/visavis-base.safetensors")?;
+/// let engine = Engine::load("models/visavis-base-i8.safetensors")?;
 /// let mut session = engine.session(SessionOptions::default())?;
 /// session.push_user_head(glam::Vec3::new(0.0, 1.6, 1.5), 0.0)?;
 /// while let Some(frames) = session.poll(0.0)? {
@@ -129,7 +129,7 @@ impl Engine {
     ///
     /// // A headset that only ever makes a single step.
     /// let small = Networks { reference: false, encoder: false, ..Networks::default() };
-    /// let file = BundleFile::open("models/visavis-base.safetensors")?;
+    /// let file = BundleFile::open("models/visavis-base-i8.safetensors")?;
     /// let engine = Engine::from_file_with(&file, Kernels::detect()?, small)?;
     /// let session = engine.session(SessionOptions { sampler: Sampler::Single, ..SessionOptions::default() })?;
     /// # Ok(())

@@ -36,7 +36,7 @@ dependencies {
 
 // The bundle and the sample conversation, from the repository.
 val sampleAssets by tasks.registering(Copy::class) {
-    from("../../models") { include("visavis-base.safetensors") }
+    from("../../models") { include("visavis-base-i8.safetensors") }
     from("../../samples") { include("agent.wav", "user.wav") }
     into(layout.buildDirectory.dir("sampleAssets"))
 }

@@ -14,7 +14,7 @@
 //! use visavis::engine::Engine;
 //! use visavis::eval::{Clip, EvalOptions, evaluate};
 //!
-//! let engine = Engine::load("models/visavis-base.safetensors")?;
+//! let engine = Engine::load("models/visavis-base-i8.safetensors")?;
 //! let clips = Clip::list("corpus/test", &engine.config().rig)?;
 //! let report = evaluate(&engine, &clips, None, &EvalOptions::default(), &|_| {})?;
 //! println!("{}", report.to_text());

@@ -13,7 +13,7 @@
 //! use visavis::offline::{Conversation, run};
 //! use visavis::session::SessionOptions;
 //!
-//! let engine = Engine::load("models/visavis-base.safetensors")?;
+//! let engine = Engine::load("models/visavis-base-i8.safetensors")?;
 //! let mut session = engine.session(SessionOptions::default())?;
 //! let talk = Conversation::read(Some("agent.wav".as_ref()), None, Some("user.csv".as_ref()))?;
 //! let outcome = run(&mut session, &talk, &mut |p| eprintln!("{} of {} frames", p.frames, p.total))?;

@@ -26,7 +26,7 @@ const MEMBERS: usize = SHARED_ROWS / 2;
 /// use visavis::engine::Engine;
 /// use visavis::session::SessionOptions;
 ///
-/// let engine = Engine::load("models/visavis-base.safetensors")?;
+/// let engine = Engine::load("models/visavis-base-i8.safetensors")?;
 /// let mut team = engine.team(2)?;
 /// let mut a = engine.session(SessionOptions { seed: 1, ..SessionOptions::default() })?;
 /// let mut b = engine.session(SessionOptions { seed: 2, ..SessionOptions::default() })?;

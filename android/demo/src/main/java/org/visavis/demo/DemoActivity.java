@@ -17,7 +17,7 @@ import org.visavis.VisavisSession;
 
 /** An agent to look at: drag to move the user, a slider for the gaze, a button for the sampler, one for the microphone. */
 public final class DemoActivity extends Activity {
-    static final String BUNDLE = "visavis-base.safetensors";
+    static final String BUNDLE = "visavis-base-i8.safetensors";
     private static final Sampler[] SAMPLERS = {Sampler.MIDPOINT4, Sampler.MIDPOINT2, Sampler.MIDPOINT1, Sampler.SINGLE};
 
     private VisavisEngine engine;
