@@ -117,6 +117,31 @@ def test_windows_delay_the_user_one_block_and_mark_absent_voices(tmp_path):
     assert flags.tolist() == [1, 1, 0, 1]
 
 
+def test_voices_that_are_heard_in_training_give_the_features_of_the_whole_clip(tmp_path):
+    encoder = AudioEncoder([(1, 4, 10, 5, False), (4, 4, 10, 5, False), (4, 4, 8, 4, False), (4, 4, 8, 4, False), (4, 6, 4, 2, False), (6, 6, 3, 1, True)], 6)
+    w = made_windows(tmp_path, drop=0, drop_all=0, drop_gaze=0, prefix=0, jitter=False)
+    w.audio = encoder
+    for it in w.items:
+        it["waves"] = [(torch.randn(800 * len(it["gaze"])) * 3000).short(), None]
+    torch.manual_seed(3)
+    cond = w.batch(8)[1]
+    torch.manual_seed(3)
+    picks = torch.multinomial(w.weights, 8, replacement=True).tolist()
+    for row, pick in enumerate(picks):
+        it, phase, at = w.place(pick)  # the same draws again
+        first = it["phases"][phase] + 4 * at
+        with torch.no_grad():
+            whole = encoder(it["waves"][0].float()[None] / 32768)[0, first:first + 64].reshape(16, -1)
+        assert torch.allclose(cond.agent[row], whole, atol=0.02 * float(whole.abs().max()))
+    assert cond.voice.abs().max() == 0 and cond.flags[..., 2].max() == 0
+    w.live = 3
+    torch.manual_seed(3)
+    some = w.batch(8)[1].agent
+    assert torch.equal(some[:3], cond.agent[:3]) and not torch.allclose(some[3:], cond.agent[3:])
+    cond.agent.square().mean().backward()
+    assert encoder.conv[0].weight.grad.abs().max() > 0
+
+
 def test_dropout_clears_flags_at_about_its_rate(tmp_path):
     w = made_windows(tmp_path, drop=0.05, drop_all=0.1, drop_gaze=0.35, prefix=0.0)
     flags = torch.cat([w.batch(64)[1].flags for _ in range(8)])

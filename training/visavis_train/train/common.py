@@ -79,7 +79,7 @@ class Loop:
     """How every training loop goes on after its loss: gradients averaged over the team, a step at the scheduled rate, the running
     average of weights, log and checkpoint at `out`.
 
-    `beside`: modules that are trained along and kept by the caller. `resume` goes on where `out` stands. `kept`: what else a checkpoint holds."""
+    `beside`: modules that are trained along and kept by the caller, `averages` theirs. `resume` goes on where `out` stands. `kept`: what else a checkpoint holds."""
 
     def __init__(self, team, net, out, minutes, lr, warmup=200, average=0.998, resume=False, beside=(), **kept):
         self.team, self.net, self.out, self.lr, self.warmup, self.kept = team, net, out, lr, warmup, kept
@@ -90,7 +90,7 @@ class Loop:
             net.load_state_dict(state["net"])
             self.optim.load_state_dict(state["optim"])
             self.step, spent = state["step"], state["elapsed"]
-        self.ema = Ema(net, average)
+        self.ema, self.averages = Ema(net, average), [Ema(module, average) for module in beside]
         if state:
             self.ema.net.load_state_dict(state["ema"])
             self.ema.steps = self.step
@@ -107,6 +107,8 @@ class Loop:
         nn.utils.clip_grad_norm_(self.trained.parameters(), 1.0)
         self.optim.step()
         self.ema.update(self.net)
+        for average, module in zip(self.averages, self.trained[1:]):
+            average.update(module)
         self.step += 1
         for name, value in parts.items():
             self.sums.setdefault(name, []).append(value.item() if torch.is_tensor(value) else value)

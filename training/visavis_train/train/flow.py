@@ -4,7 +4,8 @@
 
 Two regimes share each batch stream: one flow time for the whole window (imputed history, what the reference sampler does), and
 history near tau = 1 with the current block at its own flow time (what the single-step student starts from). `--end-to-end` goes on
-training an existing flow with the audio encoder unfrozen on raw voices (cache made with --waves).
+training an existing flow with the audio encoder unfrozen on raw voices (cache made with --waves); hearing a window takes about six times
+as long as its step, so that `--live` hears some of each batch.
 """
 import argparse
 import os
@@ -92,9 +93,12 @@ def error_factor(path, cache, tau=0.8, batches=4):
 
 
 @torch.no_grad()
-def validate(net, batches, metric):
-    """x1 error by flow time, conditional against unconditional."""
+def validate(net, held, metric):
+    """x1 error by flow time, conditional against unconditional, on the same windows and noise each time."""
     out = {}
+    with torch.random.fork_rng():
+        torch.manual_seed(1)
+        batches = [(*held.batch(16), torch.randn(16, held.blocks, len(held.mean))) for _ in range(3)]
     for name, tau in (("0", 0.0), ("3", 0.375), ("6", 0.75)):
         errors, free = [], []
         for z, cond, eps in batches:
@@ -123,14 +127,16 @@ def main():
     parser.add_argument("--compile", action="store_true", help="torch.compile the losses: minutes at the start, then a step takes 0.7 of its time")
     parser.add_argument("--resume", action="store_true")
     parser.add_argument("--end-to-end", metavar="AUDIO", help="audio checkpoint to train along; needs --init and a cache with voices")
+    parser.add_argument("--live", type=int, help="windows of a batch whose voices --end-to-end hears, others taking cached features [all]")
     parser.add_argument("--init", help="flow checkpoint whose weights to start from")
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
     torch.manual_seed(0)
     team = Team(args.workers)
-    audio = load_audio(args.end_to_end).train() if args.end_to_end else None
-    train = Windows(os.path.join(args.cache, "train.pt"), args.blocks, audio=audio)
-    held = Windows(os.path.join(args.cache, "val.pt"), args.blocks, 0, 0, 0, 0, jitter=False)
+    audio = load_audio(args.end_to_end) if args.end_to_end else None
+    if audio and args.resume:
+        audio.load_state_dict(torch.load(args.out + ".audio", weights_only=False)["trained"])
+    train = Windows(os.path.join(args.cache, "train.pt"), args.blocks, audio=audio, live=args.live)
     vae, mean, std, _ = load_vae(args.vae)
     plain = Windows(os.path.join(args.cache, "train.pt"), 16, jitter=False)
     metric = latent_metric(vae, mean, std, plain.batch(24)[0], train.mean, train.std)
@@ -142,17 +148,17 @@ def main():
         net.load_state_dict(state["net"])
     loop = common.Loop(team, net, args.out, args.minutes, args.lr, average=0.999, resume=args.resume, beside=[audio] if audio else [], size=size,
                        latent=latent, audio=width_a, latent_mean=train.mean, latent_std=train.std, metric=metric)
-    torch.manual_seed(1)
-    checks = [(*held.batch(16), torch.randn(16, args.blocks, latent)) for _ in range(3)]
+    heard = loop.averages[0].net if audio else None
+    held = Windows(os.path.join(args.cache, "val.pt"), args.blocks, 0, 0, 0, 0, jitter=False, audio=heard)
     team.seed(2 + loop.step)
     share = args.apart / (args.apart + 2.2 * (1 - args.apart))  # a step of the pair regime costs about 2.2 of the other
     which = torch.Generator().manual_seed(loop.step)  # the same regime in all processes: none waits for the dearer one
     kinds = {True: apart_loss, False: shared_loss}
-    measure = lambda net: validate(net, checks, metric)
+    measure = lambda net: validate(net, held, metric)
 
     def keep_audio():
         if audio and team.leads:
-            common.save(args.out + ".audio", net=audio.state_dict(), spec=audio.spec, features=width_a)
+            common.save(args.out + ".audio", net=heard.state_dict(), trained=audio.state_dict(), spec=audio.spec, features=width_a)
 
     if args.compile:
         with torch.no_grad():
