@@ -16,11 +16,13 @@ def arguments(**kw):
 
 def test_stages_hand_on_what_they_make():
     stages = pipeline.stages(arguments())
-    assert [s[0] for s in stages] == ["corpus", "audio", "vae", "cache", "flow", "student", "decoder", "curves", "export-f32", "export-f16"]
+    assert [s[0] for s in stages] == ["corpus", "audio", "vae", "cache", "flow", "flow-audio", "relisten", "student", "decoder", "curves", "export-f32", "export-f16"]
     made = {"W/corpus", "W/runs/curves"}
     for name, _, _, line in stages:
         made |= {line[i + 1] for i, word in enumerate(line) if word == "--out"}
-        needed = {line[i + 1] for i, word in enumerate(line) if word in ("--vae", "--audio", "--flow", "--student", "--cache", "--corpus")}
+        made |= {line[i + 1] + ".audio" for i, word in enumerate(line) if word == "--out" and "--end-to-end" in line}
+        needed = {line[i + 1] for i, word in enumerate(line)
+                  if word in ("--vae", "--audio", "--flow", "--student", "--cache", "--corpus", "--relisten", "--end-to-end", "--init")}
         assert needed <= made, f"{name} needs {needed - made}"
     minutes = {s[0]: s[3][s[3].index("--minutes") + 1] for s in stages if "--minutes" in s[3]}
     assert minutes["vae"] == str(pipeline.MINUTES["vae"] * 0.5)

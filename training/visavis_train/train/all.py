@@ -14,7 +14,7 @@ import sys
 from ..corpus.voices import SPLITS
 
 # Minutes at --scale 1, for one worker with a core of its own.
-MINUTES = {"audio": 15, "vae": 60, "flow": 75, "student": 30, "decoder": 20}
+MINUTES = {"audio": 15, "vae": 60, "flow": 75, "flow-audio": 25, "student": 30, "decoder": 20}
 
 
 def stages(a):
@@ -23,7 +23,8 @@ def stages(a):
     at = lambda name: os.path.join(runs, name)
     if not a.data and not a.start:
         raise SystemExit("--data is needed: the audio encoder trains on DATA/speech (or give --start, and its audio encoder is kept)")
-    audio = at("audio.pt") if a.data else os.path.join(runs, "start", "audio.pt")
+    alone = at("audio.pt") if a.data else os.path.join(runs, "start", "audio.pt")
+    flow, audio, heard = at("flow-audio.pt"), at("flow-audio.pt.audio"), at("cache-audio")
     length = lambda name: ["--minutes", str(MINUTES[name] * a.scale)]
     many = ["--threads", str(a.threads), "--workers", str(a.workers)]
     start = lambda name: ["--init", os.path.join(runs, "start", f"{name}.pt")] if a.start else []
@@ -33,22 +34,25 @@ def stages(a):
     if a.start:
         out.append(("start", None, "checkpoints", ["--bundle", a.start, "--out", at("start")]))
     if a.data:
-        out.append(("audio", None, "train.audio", ["--speech", os.path.join(a.data, "speech"), "--out", audio, "--threads", str(a.threads),
+        out.append(("audio", None, "train.audio", ["--speech", os.path.join(a.data, "speech"), "--out", alone, "--threads", str(a.threads),
                                                    "--only", ",".join(SPLITS["train"]), "--validate", ",".join(SPLITS["val"]), *length("audio"), *start("audio")]))
     out += [
         ("vae", at("vae.pt"), "train.vae", ["--corpus", corpus, "--out", at("vae.pt"), "--size", a.size, *length("vae"), *many, *start("vae")]),
-        ("cache", None, "train.cache", ["--corpus", corpus, "--vae", at("vae.pt"), "--audio", audio, "--out", at("cache"),
-                                        "--threads", str(a.threads)]),
+        ("cache", None, "train.cache", ["--corpus", corpus, "--vae", at("vae.pt"), "--audio", alone, "--out", at("cache"),
+                                        "--threads", str(a.threads), "--waves"]),
         ("flow", at("flow.pt"), "train.flow", ["--cache", at("cache"), "--vae", at("vae.pt"), "--out", at("flow.pt"), "--size", a.size,
                                                *length("flow"), *many, *start("flow")]),
-        ("student", at("student.pt"), "train.student", ["--cache", at("cache"), "--vae", at("vae.pt"), "--flow", at("flow.pt"),
+        ("flow-audio", at("flow-audio.pt"), "train.flow", ["--cache", at("cache"), "--vae", at("vae.pt"), "--out", at("flow-audio.pt"), "--init", at("flow.pt"),
+                                                           "--end-to-end", alone, "--live", "4", "--batch", "16", "--lr", "3e-4", *length("flow-audio"), *many]),
+        ("relisten", None, "train.cache", ["--relisten", at("cache"), "--corpus", corpus, "--audio", audio, "--out", heard, "--threads", str(a.threads)]),
+        ("student", at("student.pt"), "train.student", ["--cache", heard, "--vae", at("vae.pt"), "--flow", flow,
                                                         "--out", at("student.pt"), *length("student"), *many]),
-        ("decoder", at("vae-fine.pt"), "train.decoder", ["--corpus", corpus, "--cache", at("cache"), "--vae", at("vae.pt"), "--flow", at("flow.pt"),
+        ("decoder", at("vae-fine.pt"), "train.decoder", ["--corpus", corpus, "--cache", heard, "--vae", at("vae.pt"), "--flow", flow,
                                                          "--student", at("student.pt"), "--out", at("vae-fine.pt"), *length("decoder"), *many]),
-        ("curves", None, "train.curves", [at(f"{n}.pt.jsonl") for n in (*(("audio",) if a.data else ()), "vae", "flow", "student", "vae-fine")] + ["--out", at("curves")]),
+        ("curves", None, "train.curves", [at(f"{n}.pt.jsonl") for n in (*(("audio",) if a.data else ()), "vae", "flow", "flow-audio", "student", "vae-fine")] + ["--out", at("curves")]),
     ]
     for kind, extra in (("f32", []), ("f16", ["--half"])):
-        out.append((f"export-{kind}", None, "export", ["--corpus", corpus, "--audio", audio, "--vae", at("vae-fine.pt"), "--flow", at("flow.pt"),
+        out.append((f"export-{kind}", None, "export", ["--corpus", corpus, "--audio", audio, "--vae", at("vae-fine.pt"), "--flow", flow,
                                                        "--student", at("student.pt"), "--out", os.path.join(a.work, f"base-{kind}.safetensors"), *extra]))
     return out
 

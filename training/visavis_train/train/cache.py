@@ -10,6 +10,7 @@ import os
 
 import torch
 
+from ..corpus import store
 from ..nets.audio import AudioEncoder
 from ..nets.vae import Vae
 from .team import Team
@@ -68,6 +69,18 @@ def features(audio, clip, frames):
             "has": (clip.agent_voice is not None, clip.user_voice is not None)}
 
 
+def relisten(cache, corpus, split, audio, team, out):
+    """The cache's split with features of another audio encoder; all else as it is, without the voices."""
+    state = torch.load(os.path.join(cache, split + ".pt"), weights_only=False, mmap=True)
+    items = []
+    for item in state["items"][team.rank::team.size]:
+        clip = store.load(os.path.join(corpus, split, item["name"]))
+        items.append({k: v for k, v in item.items() if k != "waves"} | features(audio, clip, len(item["gaze"])))
+    items = team.gather(items, os.path.join(out, f"{split}.part"))
+    if team.leads:
+        torch.save(state | {"items": items}, os.path.join(out, split + ".pt"))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--corpus", required=True)
@@ -79,6 +92,7 @@ def main():
     parser.add_argument("--workers", type=int, default=1, help="processes that share the clips")
     parser.add_argument("--waves", action="store_true", help="keep the voices too (i16), for flow training with --end-to-end")
     parser.add_argument("--reuse", metavar="CACHE", help="take everything but the latents from an earlier cache of this corpus (same audio encoder)")
+    parser.add_argument("--relisten", metavar="CACHE", help="take everything but the voices' features from an earlier cache of this corpus (same VAE)")
     parser.add_argument("--threads", type=int, default=1)
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
@@ -88,6 +102,9 @@ def main():
     os.makedirs(args.out, exist_ok=True)
     stats = None
     for split in ("train", "val"):
+        if args.relisten:
+            relisten(args.relisten, args.corpus, split, audio, team, args.out)
+            continue
         items, paths, known, poses = [], clips(args.corpus, split), {}, {}
         if args.reuse and not args.waves:
             known = {i["name"]: i for i in torch.load(os.path.join(args.reuse, split + ".pt"), weights_only=False, mmap=True)["items"]}

@@ -30,7 +30,7 @@ class Windows:
     from the voices (cache made with --waves), with gradients; the others take the cached ones."""
 
     def __init__(self, cache, blocks, drop=0.05, drop_all=0.1, drop_gaze=0.35, prefix=0.1, jitter=True, audio=None, live=None):
-        state = torch.load(cache, weights_only=False, mmap=audio is not None)
+        state = torch.load(cache, weights_only=False, mmap=True)
         self.items = [i for i in state["items"] if len(i["z"][-1]) >= blocks]
         self.mean, self.std, self.blocks = state["latent_mean"], state["latent_std"], blocks
         self.drop, self.drop_all, self.drop_gaze, self.prefix, self.jitter = drop, drop_all, drop_gaze, prefix, jitter
