@@ -15,6 +15,10 @@ use std::sync::Arc;
 
 /// Most frames of an idle clip: every session starts by going through them.
 const MAX_IDLE_FRAMES: usize = 3600;
+/// The idle clip's frames, in bundles as they are exported.
+pub(crate) const IDLE_FRAMES: &str = "idle.frames";
+/// Its latents, in their place in quantised bundles.
+pub(crate) const IDLE_LATENTS: &str = "idle.latents";
 
 /// Which networks of a bundle an engine holds: what no session will use need not take memory, nor time to load.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -164,13 +168,7 @@ impl Engine {
         let features = feature_count(config.rig.joints.len());
         let latent = config.vae.latent;
         let layout = ConditionLayout { audio_features: config.audio.features };
-        let (idle_frames, idle) = t.f32_rows("idle.frames", features)?;
-        if idle_frames % BLOCK_FRAMES != 0 || idle_frames > MAX_IDLE_FRAMES {
-            let message = format!(
-                "tensor idle.frames has {idle_frames} frames, not a multiple of {BLOCK_FRAMES} up to {MAX_IDLE_FRAMES}"
-            );
-            return Err(Error::new(ErrorKind::BundleInvalid, message));
-        }
+        let idle = Idle::read(t, features, latent)?;
         let net = |prefix: &str, wanted: bool| {
             if !wanted {
                 t.skip(&format!("{prefix}."));
@@ -197,7 +195,10 @@ impl Engine {
             config,
         };
         t.finish()?;
-        engine.idle = engine.encode(&encoder, &idle)?;
+        engine.idle = match idle {
+            Idle::Frames(frames) => engine.encode(&encoder, &frames)?,
+            Idle::Latents(latents) => latents,
+        };
         engine.encoder = networks.encoder.then_some(encoder);
         Ok(engine)
     }
@@ -300,6 +301,35 @@ impl Engine {
             [c.vae.width * c.vae.mlp.max(3), self.features(), 4 * c.audio.features, c.vae.latent, c.flow.tau_width];
         let width = flow.into_iter().chain(rest).fold(audio, usize::max);
         Exec::new(self.kernels, threads, Limits { rows: rows.max(32), width })
+    }
+}
+
+/// The idle clip, as bundles hold it: exported ones its frames, quantised ones the latents that the encoder made of them.
+enum Idle {
+    /// Pose features in metres, `[4 blocks, features]`.
+    Frames(Vec<f32>),
+    /// Standardised latents, `[blocks, latent]`.
+    Latents(Vec<f32>),
+}
+
+impl Idle {
+    fn read(t: &Tensors<'_>, features: usize, latent: usize) -> Result<Self> {
+        let invalid = |message| Err(Error::new(ErrorKind::BundleInvalid, message));
+        if t.has(IDLE_LATENTS) {
+            let most = MAX_IDLE_FRAMES / BLOCK_FRAMES;
+            return match t.f32_rows(IDLE_LATENTS, latent)? {
+                (blocks, _) if blocks > most => {
+                    invalid(format!("tensor {IDLE_LATENTS} has {blocks} blocks, not up to {most}"))
+                }
+                (_, latents) => Ok(Self::Latents(latents)),
+            };
+        }
+        match t.f32_rows(IDLE_FRAMES, features)? {
+            (frames, _) if frames % BLOCK_FRAMES != 0 || frames > MAX_IDLE_FRAMES => invalid(format!(
+                "tensor {IDLE_FRAMES} has {frames} frames, not a multiple of {BLOCK_FRAMES} up to {MAX_IDLE_FRAMES}"
+            )),
+            (_, features) => Ok(Self::Frames(features)),
+        }
     }
 }
 

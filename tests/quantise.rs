@@ -161,6 +161,34 @@ fn flipped_bits_are_errors_or_harmless() {
     }
 }
 
+/// Half the bytes of f32, by every tensor but the statistics, and the idle clip as the latents that the encoder makes of it.
+#[test]
+fn a_bundle_of_halves_is_half_a_bundle() {
+    let file = tiny_f32();
+    let keep = ["flow.layers.0.fc1=f32".parse().unwrap()];
+    let contents = |file: &BundleFile<'_>| Contents::of(file).unwrap().tensors;
+    let before = contents(&file);
+    let bytes = |tensors: &[visavis::bundle::TensorInfo]| tensors.iter().map(|t| t.bytes).sum::<usize>();
+    let halves = quantise(&file, &Options { smallest: 8192, ..options(Scheme::F16, &[]) }).unwrap().bytes;
+    let halves = contents(&BundleFile::from_bytes(halves, "halves"));
+    assert!(2 * bytes(&halves) <= bytes(&before), "{} of {}", bytes(&halves), bytes(&before));
+    for t in &halves {
+        let vector = t.shape.len() < 2 || !t.name.ends_with(".weight");
+        let float =
+            t.name.starts_with("stats.") || t.name == "idle.latents" || t.name.starts_with("vae.decoder.") && vector;
+        assert_eq!(t.dtype, if float { "f32" } else { "f16" }, "{}", t.name);
+    }
+
+    let quantised = quantise(&file, &options(Scheme::F16, &keep)).unwrap().bytes;
+    let kept = contents(&BundleFile::from_bytes(quantised.clone(), "kept"));
+    let dtype = |name: &str| kept.iter().find(|t| t.name == name).map(|t| t.dtype.as_str());
+    assert_eq!([dtype("flow.layers.0.fc1.bias"), dtype("flow.layers.1.fc1.bias")], [Some("f32"), Some("f16")]);
+    assert_eq!([dtype("idle.frames"), dtype("idle.latents")], [None, Some("f32")]);
+    let engine = |file: &BundleFile<'_>| Engine::from_file(file, Kernels::detect().unwrap()).unwrap();
+    let (old, new) = (engine(&file), engine(&BundleFile::from_bytes(quantised, "kept")));
+    assert!(old.idle_blocks() > 0 && old.idle_blocks() == new.idle_blocks());
+}
+
 #[test]
 fn kept_layers_stay_floats_and_inspect_tells() {
     let keep: Vec<Keep> = ["flow.layers.*", "*.qkv=f32"].iter().map(|k| k.parse().unwrap()).collect();

@@ -23,6 +23,13 @@ fn a_quick_report_tells_everything() {
     let (numerics, out) = (path("numerics.json"), path("out"));
 
     succeeds(&["report", "--reference", &f16, "--candidate", &i8, "--quick", "--numerics-only", &numerics]);
+    let evaluation = |name: &str, model: &str, seed: &str| {
+        let (file, shape) = (path(name), ["--windows", "2", "--sampler", "single", "--quick", "--motion-only"]);
+        succeeds(&[&["eval", "--model", model, "--seed", seed, "--json", &file], &shape[..]].concat());
+        file
+    };
+    let evaluated = [("f16.json", &f16, "0"), ("i8.json", &i8, "0"), ("seed.json", &f16, "1")];
+    let [eval_f16, eval_i8, eval_seed] = evaluated.map(|(name, model, seed)| evaluation(name, model, seed));
     let text = succeeds(&[
         "report",
         "--reference",
@@ -34,6 +41,11 @@ fn a_quick_report_tells_everything() {
         &out,
         "--other-machine",
         &numerics,
+        "--eval",
+        &eval_f16,
+        &eval_i8,
+        "--eval-other-seed",
+        &eval_seed,
     ]);
     assert!(text.contains("mean joint error") && text.contains("report.html"), "{text}");
     assert_eq!(names(&dir.path("out")), ["report.html", "report.json", "report.md"]);
@@ -55,8 +67,15 @@ fn a_quick_report_tells_everything() {
     assert!(unread["output"].is_null(), "a layer that no block runs has no outputs: {unread}");
     assert_eq!(json["speed"].as_array().unwrap().len(), 2);
 
+    let changed = |v: &serde_json::Value| v[0]["change"].as_f64().unwrap().abs();
+    let judged = &json["judged"];
+    assert!(changed(&judged["fgd"][0]) > 0.0 && changed(&judged["chance"]) > 0.0, "{judged}");
+    let target = json["targets"][0].as_array().unwrap().iter().find(|t| t["what"] == "change of FGD").unwrap();
+    assert_eq!(target["measured"].as_f64().unwrap(), changed(&judged["fgd"][0]));
+
     let (html, md) = (read("report.html"), read("report.md"));
-    for part in ["In short", "Targets", "Free-running", "Speed", "Other machines", "flow.layers.0.qkv"] {
+    for part in ["In short", "Targets", "Free-running", "Speed", "Other machines", "Change of FGD", "flow.layers.0.qkv"]
+    {
         assert!(html.contains(part) && md.contains(part), "{part}");
     }
     assert!(html.contains("<svg") && !html.contains("http-equiv") && !html.contains("<script"), "pictures, no scripts");

@@ -50,6 +50,11 @@ impl<'a> Tensors<'a> {
         infos
     }
 
+    /// Whether the bundle holds a tensor of this name.
+    pub fn has(&self, name: &str) -> bool {
+        self.container.as_ref().is_some_and(|container| container.tensor(name).is_ok())
+    }
+
     /// Reads a vector or matrix of the given shape, f32 or f16 in the file, as f32.
     ///
     /// # Errors

@@ -53,6 +53,12 @@ pub struct EvalArgs {
     /// A look: four windows and few, short runs
     #[arg(long)]
     pub quick: bool,
+    /// Only what bundles are compared by: motion with free gaze, and reconstruction
+    #[arg(long)]
+    pub motion_only: bool,
+    /// Seed of all windows; another one tells what chance alone changes
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u32,
 }
 
 fn temperature(text: &str) -> std::result::Result<f32, String> {
@@ -64,6 +70,8 @@ pub fn run(args: &EvalArgs) -> Result<()> {
     let mut options = EvalOptions {
         threads: args.threads,
         quick: args.quick,
+        motion_only: args.motion_only,
+        seed: args.seed,
         session: SessionOptions {
             guidance: args.guidance,
             gaze_guidance: args.gaze_guidance,

@@ -29,6 +29,9 @@ pub struct ReportArgs {
     /// What `visavis eval --json` wrote for the reference and for each candidate, on the same clips
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub eval: Vec<PathBuf>,
+    /// The same for the reference with another --seed: what chance alone changes
+    #[arg(long, value_name = "FILE", requires = "eval")]
+    pub eval_other_seed: Option<PathBuf>,
     /// A few blocks of everything: to see that it works
     #[arg(long)]
     pub quick: bool,
@@ -62,6 +65,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
         timed: if args.quick { 10 } else { 200 },
         other,
         eval: args.eval.clone(),
+        eval_other_seed: args.eval_other_seed.clone(),
         progress: &progress,
     };
     if let Some(file) = &args.numerics_only {

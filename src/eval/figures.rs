@@ -3,9 +3,7 @@
 use super::window::Window;
 use crate::error::Result;
 use crate::frame::Frame;
-use crate::metrics::{
-    Moments, Space, Split, Summary, acceleration_moments, ape, frechet, mean_frechet, pck, pose_moments,
-};
+use crate::metrics::{Moments, Space, Split, Summary, acceleration_moments, ape, frechet, pck, pose_moments};
 use crate::pose::Rig;
 use serde::Serialize;
 
@@ -56,6 +54,10 @@ pub struct Figures {
     /// Frechet distance of poses to the corpus', m²: over all windows the mean over batches of 8 windows, over a class of windows that
     /// of the pooled class (SARAH 4).
     pub fgd: Option<f64>,
+    /// Over all windows: the distance of each batch, whose mean is [`Figures::fgd`]. What two bundles' batches differ by tells how sure
+    /// the difference of their means is.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub fgd_batches: Vec<f64>,
     /// Frechet distance of accelerations, (m/s²)², likewise.
     pub fgd_acceleration: Option<f64>,
     /// Share of frames with a sliding foot, 0 to 1.
@@ -120,22 +122,18 @@ impl Figures {
         let own: Vec<&Measured> = motion.iter().filter(chosen).collect();
         let true_ones: Vec<&Measured> = truth.iter().filter(chosen).collect();
         let average = |value: &dyn Fn(&Measured) -> Option<f64>| mean(own.iter().filter_map(|m| value(m)));
-        let distance = |moments: &dyn Fn(&Measured) -> &Moments| match class {
-            None => {
-                let batches: Vec<_> = own
-                    .chunks(BATCH)
-                    .zip(true_ones.chunks(BATCH))
-                    .map(|(a, b)| (pooled(a, moments), pooled(b, moments)))
-                    .collect();
-                mean_frechet(batches.iter().map(|(a, b)| (a, b)))
-            }
-            Some(_) => frechet(&pooled(&own, moments), &pooled(&true_ones, moments)),
+        let batches = |moments: &dyn Fn(&Measured) -> &Moments| -> Option<Vec<f64>> {
+            let size = if class.is_none() { BATCH } else { own.len().max(1) };
+            let pairs = own.chunks(size).zip(true_ones.chunks(size));
+            pairs.map(|(a, b)| frechet(&pooled(a, moments), &pooled(b, moments))).collect()
         };
+        let poses = batches(&|m| &m.poses);
         let beat = |m: &Measured| m.summary.beat.filter(|_| m.speaking);
         Self {
             windows: own.len(),
-            fgd: distance(&|m| &m.poses),
-            fgd_acceleration: distance(&|m| &m.accelerations),
+            fgd: poses.as_ref().and_then(|d| mean(d.iter().copied())),
+            fgd_batches: poses.filter(|_| class.is_none()).unwrap_or_default(),
+            fgd_acceleration: batches(&|m| &m.accelerations).and_then(|d| mean(d.into_iter())),
             foot_slide: average(&|m| m.summary.foot_slide),
             support_foot_speed: average(&|m| m.summary.support_foot_speed),
             wrist_speed: average(&|m| m.summary.wrist_speed),

@@ -72,6 +72,11 @@ pub struct EvalOptions {
     pub session: SessionOptions,
     /// Fewer and shorter runs, for a look: the gaze dial, reaction, endurance and following are tried a few times only.
     pub quick: bool,
+    /// Only what two bundles are compared by: the corpus' row, the samplers' with free gaze, reconstruction. No looked-up motion, gaze
+    /// dials, reaction, endurance and following.
+    pub motion_only: bool,
+    /// Window `i` has the seed `2^32 seed + i`: with another seed here the figures tell what chance alone changes.
+    pub seed: u32,
 }
 
 impl Default for EvalOptions {
@@ -83,6 +88,8 @@ impl Default for EvalOptions {
             samplers: vec![Sampler::Midpoint(4), Sampler::Midpoint(2), Sampler::Midpoint(1), Sampler::Single],
             session: SessionOptions::default(),
             quick: false,
+            motion_only: false,
+            seed: 0,
         }
     }
 }
@@ -113,7 +120,7 @@ pub struct Report {
     pub quick: bool,
     /// What Random and NN looked up their motion in.
     pub bank: String,
-    /// `corpus`, `Random`, `NN`, then the samplers with free gaze, then the gaze targets.
+    /// `corpus`, `Random`, `NN` (these two where they were asked for), then the samplers with free gaze, then the gaze targets.
     pub rows: Vec<Row>,
     /// The gaze dial of the first sampler and of the single step.
     pub dials: Vec<Dial>,
@@ -154,19 +161,23 @@ pub fn evaluate(
 ) -> Result<Report> {
     let windows = Window::choose(clips, options.windows)?;
     let tell = |stage: &str| progress(EvalProgress { stage, done: 0, total: 0 });
-    tell("bank");
-    let own = bank.is_none();
-    let bank = Bank::new(bank.unwrap_or(clips).to_vec(), own)?;
     let judge = Judge { engine, windows: &windows, options, progress };
 
     let truth = judge.measure("corpus", &|_, window| Ok(Some(window.truth.frames.clone())))?.unwrap_or_default();
     let mut rows = vec![Row::new("corpus".into(), None, &truth, &truth)];
-    let random = |i: usize, window: &Window| bank.random(window, i as u64);
-    let nearest = |_: usize, window: &Window| bank.nearest(window);
-    for (name, source) in [("Random", &random as Source<'_>), ("NN", &nearest)] {
-        if let Some(motion) = judge.measure(name, source)? {
-            rows.push(Row::new(name.into(), None, &motion, &truth));
+    let mut searched = "nothing".to_owned();
+    if !options.motion_only {
+        tell("bank");
+        let own = bank.is_none();
+        let bank = Bank::new(bank.unwrap_or(clips).to_vec(), own)?;
+        let random = |i: usize, window: &Window| bank.random(window, i as u64);
+        let nearest = |_: usize, window: &Window| bank.nearest(window);
+        for (name, source) in [("Random", &random as Source<'_>), ("NN", &nearest)] {
+            if let Some(motion) = judge.measure(name, source)? {
+                rows.push(Row::new(name.into(), None, &motion, &truth));
+            }
         }
+        searched = format!("{} stretches of {}", bank.len(), if own { "the other clips" } else { "the bank" });
     }
     let samplers = judge.samplers()?;
     for &sampler in &samplers {
@@ -174,7 +185,7 @@ pub fn evaluate(
     }
     let mut dials = Vec::new();
     for (i, &sampler) in samplers.iter().enumerate() {
-        if i > 0 && sampler != Sampler::Single {
+        if options.motion_only || i > 0 && sampler != Sampler::Single {
             continue;
         }
         let dialled: Vec<Row> =
@@ -187,24 +198,27 @@ pub fn evaluate(
     let (threads, quick) = (options.threads, options.quick);
     tell("reconstruction");
     let reconstruction = Reconstruction::measure(engine, &windows, threads)?;
-    tell("reaction time");
-    let reaction = Reaction::measure(engine, &session, clips, &windows, threads, quick)?;
-    tell("following");
-    let follow = Follow::measure(engine, &session, &windows, threads, quick)?;
-    tell("endurance");
-    let endurance = Endurance::measure(engine, &session, &windows, threads, quick)?;
+    let (mut reaction, mut follow, mut endurance) = (None, None, None);
+    if !options.motion_only {
+        tell("reaction time");
+        reaction = Some(Reaction::measure(engine, &session, clips, &windows, threads, quick)?);
+        tell("following");
+        follow = Some(Follow::measure(engine, &session, &windows, threads, quick)?);
+        tell("endurance");
+        endurance = Some(Endurance::measure(engine, &session, &windows, threads, quick)?);
+    }
     let mut report = Report {
         model: engine.config().name.clone(),
         clips: clips.len(),
         windows: [windows.len(), windows.iter().filter(|w| w.speaking).count()],
         quick,
-        bank: format!("{} stretches of {}", bank.len(), if own { "the other clips" } else { "the bank" }),
+        bank: searched,
         rows,
         dials,
         reconstruction,
-        reaction: Some(reaction),
-        endurance: Some(endurance),
-        follow: Some(follow),
+        reaction,
+        endurance,
+        follow,
         verdicts: Vec::new(),
     };
     report.verdicts = targets::verdicts(&report);
@@ -239,7 +253,8 @@ impl Judge<'_> {
     fn row(&self, sampler: Sampler, gaze: Option<f32>, truth: &[Measured]) -> Result<Row> {
         let name = gaze.map_or_else(|| sampler.to_string(), |g| format!("{sampler}, gaze {g}"));
         let motion = self.measure(&name, &|i, window| {
-            let options = SessionOptions { sampler, gaze, seed: i as u64, ..self.options.session.clone() };
+            let seed = u64::from(self.options.seed) << 32 | i as u64;
+            let options = SessionOptions { sampler, gaze, seed, ..self.options.session.clone() };
             motion::in_window(self.engine, &options, window).map(Some)
         })?;
         Ok(Row::new(name, gaze, &motion.unwrap_or_default(), truth))

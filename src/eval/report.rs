@@ -42,7 +42,9 @@ impl Report {
         };
         part("Motion (speaking / non-speaking in brackets; FGD cm², FGD_acc (m/s²)², wrists m/s)", &self.motion());
         part("Feet, voice, keypoints (support foot mm/s, APE mm, PCK at 10 cm, bones %)", &self.details());
-        part("Gaze dial: mean score reached", &self.gaze());
+        if !self.dials.is_empty() {
+            part("Gaze dial: mean score reached", &self.gaze());
+        }
         part("Behaviour", &self.behaviour());
         part("Targets", &self.targets());
         out

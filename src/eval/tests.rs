@@ -65,6 +65,31 @@ fn a_report_is_whole_and_the_same_on_any_number_of_threads() {
     }
 }
 
+/// What two bundles are compared by, and no more; a seed changes motion and nothing else.
+#[test]
+fn motion_alone_has_the_same_figures() {
+    let engine = tiny();
+    let clips = made_up(&engine.config().rig, &talk());
+    let samplers = vec![Sampler::Midpoint(1), Sampler::Single];
+    let whole = EvalOptions { windows: 4, samplers, quick: true, ..EvalOptions::default() };
+    let run = |seed| {
+        let options = EvalOptions { motion_only: true, seed, ..whole.clone() };
+        evaluate(&engine, &clips, None, &options, &|_| {}).unwrap()
+    };
+    let report = run(0);
+    let names: Vec<_> = report.rows.iter().map(|row| row.name.as_str()).collect();
+    assert_eq!(names, ["corpus", "midpoint1", "single"]);
+    assert!(report.dials.is_empty() && report.reaction.is_none() && report.follow.is_none());
+    assert!(report.endurance.is_none() && !report.to_text().contains("Gaze dial"));
+    let all = quick(2);
+    assert_eq!(report.rows[1..], all.rows[3..5]);
+    assert_eq!(report.reconstruction, all.reconstruction);
+    let batches = &report.rows[1].all.fgd_batches;
+    assert_eq!((batches.len(), Some(batches[0])), (1, report.rows[1].all.fgd), "four windows are one batch");
+    let other = run(1);
+    assert!(other.rows[0] == report.rows[0] && other.rows[1] != report.rows[1]);
+}
+
 /// A bundle whose poses no body could take is called defective, whether the guard trips again and again or holds without end.
 #[test]
 fn a_bundle_that_trips_the_guard_is_defective() {

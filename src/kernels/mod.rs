@@ -1,12 +1,41 @@
 //! Arithmetic of the networks: skinny matrix products, attention, normalisation, activations, polar factors.
 //!
-//! One folder per operation: `mod.rs` holds the contract and the one table of variants, `scalar.rs` the reference,
-//! and each further file one variant. Tests iterate the tables, so a variant cannot be listed untested.
+//! One folder an operation, each of the same make:
+//!
+//! | file | holds |
+//! |---|---|
+//! | `mod.rs` | the contract: the formula, the shapes, what slices must hold, how packed data lies; and `VARIANTS`, the one table of variants |
+//! | `scalar.rs` | the reference: plain Rust that defines every bit of the result |
+//! | `avx2.rs`, `neon.rs`, ... | one variant each, named after the level that it needs |
+//! | `tests.rs` | every entry of the table that this CPU can run against the reference, with random shapes, tails, unaligned slices and extremes; then what the reference itself must do |
+//!
+//! | operation | computes | for |
+//! |---|---|---|
+//! | `matmul_f32_f32`, `matmul_f32_f16` | x W', float weights | bundles of floats, and layers that are kept so |
+//! | `matmul_i8dx_i8cx` | the same of int8 rows (`i8dx`: quantised per row as they come) and int8 weights (`i8cx`: a scale a channel) | nearly all weights of int8 bundles |
+//! | `matmul_i8dx_i4g` | the same with int4 weights, a scale for a group of 32 columns | nearly all weights of int4 bundles |
+//! | `quantize_rows` | rows of activations to int8 | both of those |
+//! | `epilogue` | what follows a product: scales, bias, then store, GELU, or addition to the residual stream, gated or not | every product |
+//! | `norm` | layer normalisation with AdaLN's shift and scale | flow, autoencoder |
+//! | `rope` | rotary positions | queries and keys |
+//! | `attend` | attention over rings of cached keys and values, softmax included | flow, autoencoder |
+//! | `gelu` | GELU and SiLU by themselves | embedding of the flow time |
+//! | `polar` | nearest rotations of 3x3 matrices | all joints of a frame |
+//!
+//! To read one, open `matmul_i8dx_i8cx/mod.rs`, then its `scalar.rs`, one variant, `tests.rs`; the others follow. `cargo test --lib kernels::OPERATION` tests one,
+//! `cargo bench --bench kernels` times all. From a layer to its kernel: [`Kernels::detect`] picks an entry of each table,
+//! [`Kernels::pack`] lays a layer's weights out for it (a [`Matrix`]), and [`Exec::linear`] cuts a product into tiles of 64 outputs, which threads take:
+//! sums by the product's variant, then the epilogue while the tile is in the first-level cache. A new variant is a file with a function of
+//! the table's type and a line in the table; no list of tests is to be kept, because tests iterate the tables, so none can be listed untested.
 //!
 //! **Same bits everywhere.** Every variant of every operation gives the bits of the scalar reference: integer sums are
 //! exact, and each float operation fixes its order of summation (16 lanes, folded by halves) and where it uses a fused
 //! multiply-add (correctly rounded on every CPU, in software at the scalar level). So a session replays bit for bit on
 //! another level, on another architecture, and with another number of threads.
+//!
+//! **Unsafe.** A variant is an `unsafe fn` for one reason: it may be called only on a CPU that has its level. [`Kernels`] and [`Matrix`] exist only for
+//! levels that were found here, which is what each call's `SAFETY` line says. Inside, variants check their operands (`check`, asserts on lengths) before
+//! the first pointer is made.
 //!
 //! Kernels do not allocate, lock, or look at the environment; they take slices whose lengths the callers in this
 //! module have checked, and [`Exec`] owns threads and scratch.

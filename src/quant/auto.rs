@@ -184,7 +184,8 @@ impl<'a> Meter<'a> {
 
     /// The largest of the errors: of each sampler's blocks, and of the way through encoder and decoder.
     fn measure(&self, weights: &[(&Layer, StoredWeights)], teachers: &[Teacher<'_>]) -> Result<f64> {
-        let bytes = write::bundle(self.file, weights, Scheme::F16)?;
+        // As an int8 bundle: there nothing but the matrices changes.
+        let bytes = write::bundle(self.file, self.reference, weights, Scheme::I8)?;
         let engine = Engine::from_file(&BundleFile::from_bytes(bytes, self.file.path()), self.reference.kernels())?;
         teachers.iter().try_fold(0.0, |worst: f64, teacher| {
             let forced = teacher.compare(&engine)?;

@@ -72,7 +72,7 @@ pub(super) fn apply(options: &Options<'_>, layers: &[Layer]) -> Result<BTreeMap<
         let kept = options.keep.iter().rev().find(|k| k.fits(&layer.name)).map(|k| k.scheme);
         let wanted = match kept {
             Some(scheme) => scheme,
-            None if layer.elements() < options.smallest => stored,
+            None if options.scheme != Scheme::F16 && layer.elements() < options.smallest => stored,
             None => default_scheme(&layer.name, layer.elements(), options.scheme),
         };
         wanted.min(stored)

@@ -13,8 +13,10 @@
 //! | `write` | putting the bundle together |
 //!
 //! Weights are quantised one layer at a time: int8 symmetric per output channel, int4 symmetric in groups of 32 columns with an f16
-//! scale. Activations are quantised when they come, per row, so nothing about them is stored. Biases, norms, embeddings of tokens and
-//! statistics stay as they are. The result depends on the input bundle and the options alone, bit for bit.
+//! scale. Activations are quantised when they come, per row, so nothing about them is stored. In int8 and int4 bundles biases, norms,
+//! embeddings of tokens and statistics stay as they are; in f16 bundles all but the statistics and the decoder's are f16 as well. The frames of the idle clip, a
+//! fiftieth of an int4 bundle, give way to their latents, which are all that an engine wants of them. The result depends on the input bundle and the options
+//! alone, bit for bit.
 
 mod auto;
 mod calibration;
@@ -48,7 +50,7 @@ use std::collections::BTreeMap;
 pub struct Options<'a> {
     /// Scheme of every layer that nothing else is said about: `f16`, `i8` or `i4`.
     pub scheme: Scheme,
-    /// Matrices with fewer weights stay as they are; [`SMALL`] unless there is a reason.
+    /// Matrices with fewer weights are not made integers, so stay as they are but in f16 bundles; [`SMALL`] unless there is a reason.
     pub smallest: usize,
     /// Layers that stay floats; the last pattern that fits a layer decides.
     pub keep: &'a [Keep],
@@ -91,7 +93,7 @@ pub fn quantise(file: &BundleFile<'_>, options: &Options<'_>) -> Result<Quantise
             (schemes, Some(choice))
         }
     };
-    let bytes = write::bundle(file, &rounder.all(&schemes)?, options.scheme)?;
+    let bytes = write::bundle(file, &reference, &rounder.all(&schemes)?, options.scheme)?;
     Ok(Quantised { bytes, schemes, choice })
 }
 

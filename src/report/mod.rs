@@ -20,7 +20,7 @@ mod spread;
 mod targets;
 
 pub use free::{FreeRun, Measures};
-pub use judged::Judged;
+pub use judged::{FgdChange, Judged};
 pub use numerics::{Blocks, CandidateNumerics, JointRow, LayerOutput, Numerics, TensorRow};
 pub use speed::Speed;
 pub use spread::Spread;
@@ -54,6 +54,8 @@ pub struct Options<'a> {
     pub other: Option<Numerics>,
     /// What `visavis eval --json` wrote for the reference and for each candidate on the same clips; none, or one each.
     pub eval: Vec<PathBuf>,
+    /// The same for the reference with another seed: what chance alone changes.
+    pub eval_other_seed: Option<PathBuf>,
     /// Told what is being done.
     pub progress: &'a dyn Fn(&str),
 }
@@ -96,7 +98,8 @@ pub fn run(options: &Options<'_>) -> Result<Report> {
         let message = "evaluations: give one of the reference, then one of each candidate, or none";
         return Err(Error::new(ErrorKind::Argument, message));
     }
-    let judged = (!options.eval.is_empty()).then(|| Judged::read(&options.eval)).transpose()?;
+    let other_seed = options.eval_other_seed.as_deref();
+    let judged = (!options.eval.is_empty()).then(|| Judged::read(&options.eval, other_seed)).transpose()?;
     let (reference, candidates) = load(options)?;
     let progress = options.progress;
     let scene = Scene::new(options.talk, options.blocks, None)?;
@@ -116,7 +119,7 @@ pub fn run(options: &Options<'_>) -> Result<Report> {
     let f32_bytes = contents.tensors.iter().map(|t| 4 * t.elements()).sum::<usize>();
     let sizes: Vec<_> = candidates.iter().map(|c| c.file.len() as f64 / f32_bytes as f64).collect();
     let schemes: Vec<_> = candidates.iter().map(scheme).collect();
-    let fgd_change = |i: usize| judged.as_ref().and_then(|j| j.fgd_change[i]);
+    let fgd_change = |i: usize| judged.as_ref().and_then(|j| j.worst(i));
     let targets = (numerics.candidates.iter().zip(&sizes).zip(&schemes).enumerate())
         .map(|(i, ((n, size), scheme))| targets::targets(*scheme, n, *size, fgd_change(i)))
         .collect();

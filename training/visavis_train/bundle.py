@@ -94,6 +94,10 @@ class Bundle:
         return self.vae.decoder(z * self.stat("latent_std") + self.stat("latent_mean"))
 
     def idle(self):
+        """Frames of the idle clip, metres; of a quantised bundle, which holds their latents alone, what the decoder makes of them."""
+        if "idle.latents" in self.tensors:
+            with torch.no_grad():
+                return self.unstandardise(self.decode(self.tensors["idle.latents"].float()[None])[0])
         return self.tensors["idle.frames"].float()
 
 

@@ -1,3 +1,5 @@
+//! The reference: one head, chunk by chunk; variants keep its order of sums, and run it for heads that are no multiple of 16 wide.
+
 use super::{CHUNK, Head};
 use crate::kernels::math::{LANES, exp, fold};
 

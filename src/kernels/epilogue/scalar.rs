@@ -1,3 +1,5 @@
+//! The reference: one row of one tile; variants are the same body, compiled for their level.
+
 use super::{Finish, Sums};
 use crate::kernels::math::gelu;
 use crate::kernels::packed::TILE_COLS;

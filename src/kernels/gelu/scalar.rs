@@ -1,3 +1,5 @@
+//! The reference: [`math`]'s functions, value by value; variants are the same bodies, compiled for their level.
+
 use crate::kernels::math;
 
 pub(super) fn gelu(x: &mut [f32]) {

@@ -1,3 +1,5 @@
+//! The reference: that of f32 weights, each weight widened.
+
 use half::f16;
 
 use super::{Job, Tile, body};

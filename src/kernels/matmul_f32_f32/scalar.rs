@@ -1,3 +1,5 @@
+//! The reference: 16 outputs in lanes, column by column of all segments.
+
 use super::{FloatGeometry, Job, Tile};
 use crate::kernels::packed::{NR, SEGMENTS};
 

@@ -1,3 +1,5 @@
+//! The reference: exact sums of each group, groups in ascending order.
+
 use super::{GROUP, GROUP_BYTES, Geometry, Job, NR, Tile};
 
 pub(super) fn run(job: &Job<'_>, tile: &mut Tile<f32>) {

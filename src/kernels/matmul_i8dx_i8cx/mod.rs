@@ -2,6 +2,7 @@
 //!
 //! `i8dx`: int8 activations, symmetric, quantised per row when they come ([`quantize_rows`](super::quantize_rows)), in -127..=127.
 //! `i8cx`: int8 weights, symmetric, one scale per output channel, in -128..=127. Scales are applied by the [`epilogue`](super::epilogue).
+//! Contract of a variant: it fills the first `rows` rows and `16 panels` columns of the tile from a [`Job`] that [`Job::check`] accepts.
 //! Sums stay below 2^31 for up to 131,071 columns, also with weights offset to unsigned.
 
 use super::packed::{NR, Tile};

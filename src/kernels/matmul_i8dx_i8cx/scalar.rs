@@ -1,3 +1,5 @@
+//! The reference: plain sums; any order gives the same integers.
+
 use super::{Job, NR, Tile};
 
 pub(super) fn run(job: &Job<'_>, tile: &mut Tile<i32>) {

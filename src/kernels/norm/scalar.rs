@@ -1,3 +1,5 @@
+//! The reference: mean, then squared deviations, then the row.
+
 use super::EPSILON;
 use crate::kernels::math::{LANES, fold};
 

@@ -1,3 +1,5 @@
+//! The reference: 16 matrices side by side in plain arrays, which variants compile for their level.
+
 use crate::kernels::math::LANES;
 
 pub(super) fn run(m: &[[f32; 9]], out: &mut [[f32; 9]]) {

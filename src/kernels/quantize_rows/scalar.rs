@@ -1,3 +1,5 @@
+//! The reference: the largest magnitude, then the row, then the sums of its groups.
+
 use super::GROUP;
 
 pub(super) fn run(x: &[f32], q: &mut [i8], sums: &mut [i32]) -> f32 {

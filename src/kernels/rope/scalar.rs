@@ -1,3 +1,5 @@
+//! The reference: head by head.
+
 pub(super) fn run(x: &mut [f32], cos: &[f32], sin: &[f32]) {
     body(x, cos, sin);
 }

@@ -80,8 +80,8 @@ fn targets(report: &Report, d: &mut Document) {
     }
     d.table(&["bundle", "figure", "at most", "measured", "verdict"], rows);
     d.text(
-        "The worst of all rows counts. The change of FGD is that of the distance to recorded motion (evaluations below); where no \
-         evaluation was given, the free runs tell each candidate's distance from the reference's motion beside what another seed alone changes.",
+        "The worst of all rows counts. The change of FGD is that of the distance to recorded motion, either way, of the sampler where it is \
+         largest; evaluations below tell its standard error. Where no evaluation was given, the free runs tell each candidate's distance from the reference's motion beside what another seed alone changes.",
     );
 }
 

@@ -2,7 +2,7 @@
 
 use super::super::chart::{bars, lines, number};
 use super::super::document::Document;
-use super::super::{Blocks, Measures, Report};
+use super::super::{Blocks, Judged, Measures, Report};
 use super::{db, four};
 
 pub(super) fn blocks(report: &Report, d: &mut Document) {
@@ -115,13 +115,35 @@ pub(super) fn free(report: &Report, d: &mut Document) {
 pub(super) fn judged(report: &Report, d: &mut Document) {
     d.heading(2, "Evaluations on recorded conversations");
     let Some(judged) = &report.judged else {
-        d.text("Not given in this run: `visavis eval --model FILE --clips DIR --json FILE.json` for each bundle, then --eval here.");
+        d.text("Not given in this run: `visavis eval --model FILE --clips DIR --motion-only --json FILE.json` for each bundle, then --eval here.");
         return;
     };
+    fgd(report, judged, d);
     let rows = judged.metrics.iter().map(|(name, values)| {
         let value = |v: &Option<f64>| v.map_or_else(|| "-".to_owned(), number);
         std::iter::once(name.clone()).chain(values.iter().map(value)).collect()
     });
     let files = judged.files.iter().map(String::as_str);
     d.table(&std::iter::once("metric").chain(files).collect::<Vec<_>>(), rows.collect());
+}
+
+/// Change of the Frechet distance to the corpus, beside what another seed changes.
+fn fgd(report: &Report, judged: &Judged, d: &mut Document) {
+    d.heading(3, "Change of FGD");
+    let names = report.numerics.candidates.iter().map(|c| c.name.as_str());
+    let rows = names.zip(&judged.fgd).chain(judged.chance.iter().map(|c| ("reference, another seed", c)));
+    let rows = rows.flat_map(|(name, changes)| {
+        changes.iter().map(move |c| {
+            let percent = |v: f64| format!("{:+.1} %", 100.0 * v);
+            let error = c.error.map_or_else(|| "-".to_owned(), |e| format!("{:.1} %", 100.0 * e));
+            vec![name.to_owned(), c.sampler.clone(), number(1e4 * c.reference), percent(c.change), error]
+        })
+    });
+    d.table(&["bundle", "sampler", "reference's FGD, cm²", "change", "standard error"], rows.collect());
+    d.text(
+        "FGD is the Frechet distance of free-running motion from the recorded motion of the same windows. Equal noise does not keep two \
+         bundles together for long, so the change of a bundle holds that of chance as well: the standard error, from batches of 8 windows that both \
+         bundles ran, tells how much, and the reference with another seed shows it. A change below about two standard errors is not told from none.",
+    );
+    d.heading(3, "All metrics");
 }
