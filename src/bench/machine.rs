@@ -74,6 +74,11 @@ pub(super) fn reset_peak() {
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 
+/// Memory of this process that is resident now, and the most that was since its start, bytes, where the system tells.
+pub fn memory() -> [Option<u64>; 2] {
+    [resident(), peak_resident()]
+}
+
 /// Memory of this process that is resident now, bytes.
 pub(super) fn resident() -> Option<u64> {
     status("VmRSS:")

@@ -11,7 +11,7 @@ mod machine;
 mod sizes;
 mod stages;
 
-pub use machine::{Machine, read_limit};
+pub use machine::{Machine, memory, read_limit};
 pub use sizes::Size;
 pub use stages::{STAGES, StageTimes};
 

@@ -48,6 +48,16 @@ impl Size {
         Engine::from_tensors(self.config(), &Tensors::seeded(scheme), kernels, networks)
     }
 
+    /// The bytes of a bundle with the weights of [`Size::engine`]: what loading takes can be measured on it.
+    ///
+    /// # Errors
+    /// As [`Size::engine`].
+    pub fn bundle(self, scheme: Scheme) -> Result<Vec<u8>> {
+        let (config, tensors) = (self.config(), Tensors::seeded_and_kept(scheme));
+        Engine::from_tensors(config.clone(), &tensors, Kernels::detect()?, Networks::default())?;
+        tensors.bundle(&config)
+    }
+
     fn config(self) -> Config {
         let rig = Rig::humanoid();
         let (name, rig, vae, flow) = match self {

@@ -15,7 +15,7 @@ mod tensors;
 pub use audio::AudioSource;
 pub use contents::{Contents, TensorInfo};
 pub use file::{BundleFile, LoadMode};
-pub(crate) use rewrite::{Entry, assemble, failed};
+pub(crate) use rewrite::{Entry, assemble, entries, failed, floats};
 pub use stored::{StoredData, StoredWeights};
 pub use tensors::Tensors;
 

@@ -1,8 +1,10 @@
 //! A bundle's file put together anew.
 
-use super::{BundleFile, CONFIG_KEY};
+use super::{BundleFile, CONFIG_KEY, StoredData, StoredWeights};
 use crate::config::GazeConfig;
 use crate::error::{Error, ErrorKind, Result};
+use crate::kernels::I4_GROUP;
+use half::f16;
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use std::collections::HashMap;
@@ -19,6 +21,30 @@ pub(crate) fn assemble(config: &serde_json::Value, entries: &[Entry]) -> Result<
     // One entry of metadata: a map of more would be written in no fixed order.
     let metadata = HashMap::from([(CONFIG_KEY.to_owned(), config.to_string())]);
     safetensors::serialize(views, Some(metadata)).map_err(failed)
+}
+
+/// The tensors of layer `name`: its weights, of shape `shape` where they are not packed, and their scales.
+pub(crate) fn entries(name: &str, shape: &[usize], weights: &StoredWeights) -> Vec<Entry> {
+    let (weight, scale) = (format!("{name}.weight"), format!("{name}.scale"));
+    let halves = |w: &[f16]| w.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>();
+    let shape = shape.to_vec();
+    match &weights.data {
+        StoredData::F32(w) => vec![(weight, Dtype::F32, shape, floats(w))],
+        StoredData::F16(w) => vec![(weight, Dtype::F16, shape, halves(w))],
+        StoredData::I8 { q, scale: s } => vec![
+            (weight, Dtype::I8, shape, q.iter().map(|&v| v as u8).collect()),
+            (scale, Dtype::F32, vec![weights.rows], floats(s)),
+        ],
+        StoredData::I4 { q, scale: s } => vec![
+            (weight, Dtype::U8, vec![weights.rows, weights.cols.div_ceil(2)], q.clone()),
+            (scale, Dtype::F16, vec![weights.rows, weights.cols.div_ceil(I4_GROUP)], halves(s)),
+        ],
+    }
+}
+
+/// Little-endian bytes.
+pub(crate) fn floats(w: &[f32]) -> Vec<u8> {
+    w.iter().flat_map(|v| v.to_le_bytes()).collect()
 }
 
 /// [`ErrorKind::BundleInvalid`] for whatever keeps a bundle from being written anew.

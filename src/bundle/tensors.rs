@@ -1,15 +1,16 @@
 //! Typed, checked access to the tensors of a bundle.
 
 use super::file::invalid;
+use super::rewrite::{Entry, assemble, entries, failed, floats as floats_of};
 use super::{StoredData, StoredWeights, drawn};
-use crate::config::Quantisation;
+use crate::config::{Config, Quantisation};
 use crate::error::{Error, ErrorKind, Result};
 use crate::kernels::{I4_GROUP, Kernels, Matrix, Scheme};
 use half::f16;
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 use std::cell::RefCell;
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 
 /// The tensors of a parsed bundle. Each read checks name, dtype, shape and finiteness, and is remembered, so that
 /// [`Tensors::finish`] can name what nobody asked for.
@@ -19,18 +20,52 @@ pub struct Tensors<'a> {
     /// Without a container: weights of this scheme are drawn as they are asked for.
     drawn: Option<Scheme>,
     quantisation: Option<Quantisation>,
+    /// Of drawn tensors, where they are to be written.
+    kept: Option<RefCell<Kept>>,
     read: RefCell<HashSet<String>>,
+}
+
+/// Tensors that were drawn, and the schemes of those that are weights.
+#[derive(Debug)]
+struct Kept {
+    entries: Vec<Entry>,
+    record: Quantisation,
 }
 
 impl<'a> Tensors<'a> {
     pub(super) fn new(container: SafeTensors<'a>, quantisation: Option<Quantisation>) -> Self {
-        Self { container: Some(container), drawn: None, quantisation, read: RefCell::default() }
+        Self { container: Some(container), drawn: None, kept: None, quantisation, read: RefCell::default() }
     }
 
     /// No bundle: every tensor that is asked for is there, drawn from its name, weights of some size in `scheme`. To measure
     /// networks of sizes for which there is no bundle.
     pub(crate) fn seeded(scheme: Scheme) -> Self {
-        Self { container: None, drawn: Some(scheme), quantisation: None, read: RefCell::default() }
+        Self { container: None, drawn: Some(scheme), kept: None, quantisation: None, read: RefCell::default() }
+    }
+
+    /// As [`Tensors::seeded`], and what has been asked for can be written: [`Tensors::bundle`].
+    pub(crate) fn seeded_and_kept(scheme: Scheme) -> Self {
+        let record = Quantisation { scheme, tensors: BTreeMap::new() };
+        Self { kept: Some(RefCell::new(Kept { entries: Vec::new(), record })), ..Self::seeded(scheme) }
+    }
+
+    /// The bytes of a bundle of `config` and all tensors that were asked for.
+    ///
+    /// # Errors
+    /// [`ErrorKind::BundleInvalid`] when it cannot be written.
+    pub(crate) fn bundle(self, config: &Config) -> Result<Vec<u8>> {
+        let kept = self.kept.map(RefCell::into_inner).ok_or_else(|| failed("its tensors were not kept"))?;
+        let config = Config { quantisation: Some(kept.record), ..config.clone() };
+        assemble(&serde_json::to_value(&config).map_err(failed)?, &kept.entries)
+    }
+
+    /// Draws floats, and keeps them where that is asked for.
+    fn draw(&self, name: &str, shape: &[usize]) -> Vec<f32> {
+        let values = drawn::floats(name, shape);
+        if let Some(kept) = &self.kept {
+            kept.borrow_mut().entries.push((name.to_owned(), Dtype::F32, shape.to_vec(), floats_of(&values)));
+        }
+        values
     }
 
     /// Names, dtypes, shapes and sizes, sorted by name; the dtype of quantised weights is their scheme.
@@ -62,7 +97,7 @@ impl<'a> Tensors<'a> {
     /// a number is not finite.
     pub fn f32(&self, name: &str, shape: &[usize]) -> Result<Vec<f32>> {
         if self.drawn.is_some() {
-            return Ok(drawn::floats(name, shape));
+            return Ok(self.draw(name, shape));
         }
         let view = self.view(name, Some(shape))?;
         floats(name, &view)
@@ -74,7 +109,7 @@ impl<'a> Tensors<'a> {
     /// As [`Tensors::f32`].
     pub fn f32_rows(&self, name: &str, columns: usize) -> Result<(usize, Vec<f32>)> {
         if self.drawn.is_some() {
-            return Ok((drawn::ROWS, drawn::floats(name, &[drawn::ROWS, columns])));
+            return Ok((drawn::ROWS, self.draw(name, &[drawn::ROWS, columns])));
         }
         let view = self.view(name, None)?;
         match view.shape() {
@@ -100,7 +135,13 @@ impl<'a> Tensors<'a> {
         let cols = inputs.iter().product::<usize>();
         let shape = [&[outputs], inputs].concat();
         if let Some(scheme) = self.drawn {
-            return Ok(drawn::weights(&weight, outputs, cols, scheme));
+            let weights = drawn::weights(&weight, outputs, cols, scheme);
+            if let Some(kept) = &self.kept {
+                let mut kept = kept.borrow_mut();
+                kept.entries.extend(entries(name, &shape, &weights));
+                kept.record.tensors.insert(weight, weights.scheme());
+            }
+            return Ok(weights);
         }
         let data = match self.recorded(&weight) {
             None => self.plain(&weight, &shape)?,

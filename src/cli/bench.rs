@@ -1,5 +1,6 @@
 //! `visavis bench`: how fast a bundle, or a size, runs here.
 
+use super::cold_start::{self, ColdStart};
 use super::{allocations, files, print};
 use clap::Args;
 use std::fmt::Write;
@@ -37,6 +38,12 @@ pub struct BenchArgs {
     /// Blocks that are timed
     #[arg(long, value_name = "N", default_value = "200", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=1_000_000))]
     pub blocks: usize,
+    /// Leaves out the cold start, for which processes of their own load the bundle
+    #[arg(long)]
+    pub no_cold_start: bool,
+    /// What the cold start is measured by: loads, makes the first frame, says so, goes on for the blocks
+    #[arg(long, hide = true, requires = "model")]
+    pub child: bool,
     /// Prints JSON: the machine, the kernels, a list of measurements
     #[arg(long)]
     pub json: bool,
@@ -52,7 +59,15 @@ pub enum NetworkSet {
 }
 
 impl NetworkSet {
-    fn of(self, samplers: &[Sampler]) -> Networks {
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::All => "all",
+            Self::Lean => "lean",
+        }
+    }
+
+    pub(super) fn of(self, samplers: &[Sampler]) -> Networks {
         match self {
             Self::All => Networks::default(),
             Self::Lean => Networks {
@@ -65,6 +80,9 @@ impl NetworkSet {
 }
 
 pub fn run(args: &BenchArgs) -> Result<()> {
+    if let (true, Some(path)) = (args.child, &args.model) {
+        return cold_start::child(args, path);
+    }
     let started = std::time::Instant::now();
     let networks = args.networks.of(&args.sampler);
     let engine = match args.size {
@@ -86,11 +104,13 @@ pub fn run(args: &BenchArgs) -> Result<()> {
             }
         }
     }
+    let cold = if args.no_cold_start { Ok(Vec::new()) } else { cold_starts(args)? };
     if args.json {
         let variants: serde_json::Map<_, _> =
             kernels.variants().iter().map(|(name, v)| ((*name).to_owned(), (*v).into())).collect();
         let all = serde_json::json!({
             "machine": machine, "level": kernels.level().to_string(), "kernels": variants, "load_ms": load_ms, "benches": benches,
+            "cold_start": cold.unwrap_or_default(),
         });
         return print(&format!("{all:#}\n"));
     }
@@ -105,7 +125,22 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     let made = if args.size.is_some() { "drawn and packed" } else { "loaded" };
     let _ = writeln!(text, "{}, {made} in {load_ms:.0} ms", engine.config().name);
     benches.iter().for_each(|bench| text.push_str(&lines(bench)));
+    match cold {
+        Ok(cold) if cold.is_empty() => {}
+        Ok(cold) => cold.iter().for_each(|c| text += &format!("\n{}", c.line())),
+        Err(e) => text += &format!("\ncold start not measured: {e}\n"),
+    }
     print(&text)
+}
+
+/// The cold start with each sampler and number of threads; the inner error where no process could be started.
+fn cold_starts(args: &BenchArgs) -> Result<std::io::Result<Vec<ColdStart>>> {
+    let file = match args.size {
+        Some(size) => cold_start::File::drawn(size, args.scheme)?,
+        None => cold_start::File::of(files::model(args.model.as_deref())?),
+    };
+    let each = args.sampler.iter().flat_map(|sampler| args.threads.iter().map(move |threads| (*sampler, *threads)));
+    Ok(each.map(|(sampler, threads)| cold_start::measure(&file, sampler, threads, args.networks)).collect())
 }
 
 fn lines(b: &Bench) -> String {

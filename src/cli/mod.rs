@@ -6,6 +6,7 @@ mod allocations;
 mod args;
 mod bench;
 mod calibrate;
+mod cold_start;
 mod demo;
 mod eval;
 mod files;

@@ -1,11 +1,11 @@
 //! Putting a quantised bundle together.
 
 use super::layers::Layer;
-use crate::bundle::{BundleFile, Entry, StoredData, StoredWeights, assemble, failed};
+use crate::bundle::{self, BundleFile, Entry, StoredWeights, assemble, failed, floats};
 use crate::config::Quantisation;
 use crate::engine::{Engine, IDLE_FRAMES, IDLE_LATENTS};
 use crate::error::Result;
-use crate::kernels::{I4_GROUP, Scheme};
+use crate::kernels::Scheme;
 use half::f16;
 use safetensors::Dtype;
 use std::collections::BTreeMap;
@@ -23,7 +23,7 @@ pub(super) fn bundle(
     let mut record = Quantisation { scheme: asked, tensors: BTreeMap::new() };
     for (layer, stored) in weights {
         record.tensors.insert(format!("{}.weight", layer.name), stored.scheme());
-        store(layer, stored, &mut entries);
+        entries.extend(bundle::entries(&layer.name, &layer.shape, stored));
     }
     for (name, view) in tensors.iter().filter(|(name, _)| !record.tensors.contains_key(*name)) {
         let shape = view.shape().to_vec();
@@ -62,26 +62,4 @@ fn narrowed(data: &[u8]) -> Option<Vec<u8>> {
     let (values, _) = data.as_chunks::<4>();
     let halves: Vec<f16> = values.iter().map(|b| f16::from_f32(f32::from_le_bytes(*b))).collect();
     halves.iter().all(|h| h.is_finite()).then(|| halves.iter().flat_map(|h| h.to_le_bytes()).collect())
-}
-
-fn floats(w: &[f32]) -> Vec<u8> {
-    w.iter().flat_map(|v| v.to_le_bytes()).collect()
-}
-
-fn store(layer: &Layer, weights: &StoredWeights, entries: &mut Vec<Entry>) {
-    let (weight, scale) = (format!("{}.weight", layer.name), format!("{}.scale", layer.name));
-    let halves = |w: &[f16]| w.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>();
-    let shape = layer.shape.clone();
-    match &weights.data {
-        StoredData::F32(w) => entries.push((weight, Dtype::F32, shape, floats(w))),
-        StoredData::F16(w) => entries.push((weight, Dtype::F16, shape, halves(w))),
-        StoredData::I8 { q, scale: s } => {
-            entries.push((weight, Dtype::I8, shape, q.iter().map(|&v| v as u8).collect()));
-            entries.push((scale, Dtype::F32, vec![weights.rows], floats(s)));
-        }
-        StoredData::I4 { q, scale: s } => {
-            entries.push((weight, Dtype::U8, vec![weights.rows, weights.cols.div_ceil(2)], q.clone()));
-            entries.push((scale, Dtype::F16, vec![weights.rows, weights.cols.div_ceil(I4_GROUP)], halves(s)));
-        }
-    }
 }
