@@ -1,5 +1,6 @@
 //! Verdicts.
 
+use super::drift::Drift;
 use super::{Figures, Hours, Soak};
 use crate::frame::{BLOCK_FRAMES, FPS};
 use crate::session::SessionStats;
@@ -7,14 +8,14 @@ use serde::Serialize;
 
 /// Growth of resident memory that is allowed.
 const MEMORY_GROWTH: f64 = 0.01;
-/// Difference between the first and the last window that is allowed.
+/// Difference between the first and the last half of the cycles that is allowed beyond what chance explains.
 const DRIFT: f64 = 0.15;
-/// Soaks that are shorter have windows too short to be compared, hours.
-const DRIFT_HOURS: f64 = 0.5;
+/// Soaks that are shorter have cycles too short to be compared, hours.
+const DRIFT_HOURS: f64 = 2.0 / 3.0;
 /// Supporting feet slower than this are compared by their difference as a share of it, m/s.
 const SUPPORT: f64 = 0.02;
 /// Seam metric at switches of the sampler that is allowed.
-const SWITCH_SEAM: f64 = 1.2;
+pub(super) const SWITCH_SEAM: f64 = 1.2;
 /// Distance by which a day of token indices may move joints of one block, root mean square, metres.
 const PRECISION: f64 = 0.005;
 /// How often what a few tokens change a day may change; means of eight places under eight noises differ by a tenth by chance.
@@ -54,8 +55,8 @@ pub struct Report {
     pub hours_apart: Hours,
     /// Seam metric at switches of the sampler; `None` where nothing moves.
     pub switch_seam: Option<f64>,
-    /// Metrics of the first and of the last window.
-    pub windows: [Figures; 2],
+    /// Metrics of the cycles, whole ones.
+    pub cycles: Vec<Figures>,
     /// What was judged.
     pub verdicts: Vec<Verdict>,
 }
@@ -99,7 +100,7 @@ pub(super) struct Measured {
     pub(super) blocks: u64,
     pub(super) seconds: f64,
     pub(super) stats: SessionStats,
-    pub(super) windows: [Figures; 2],
+    pub(super) cycles: Vec<Figures>,
     pub(super) memory: Memory,
     pub(super) allocations: Option<u64>,
     pub(super) hours: Hours,
@@ -107,7 +108,7 @@ pub(super) struct Measured {
 }
 
 pub(super) fn report(soak: &Soak, measured: Measured) -> Report {
-    let Measured { blocks, seconds, stats, windows, memory, allocations, hours, switches } = measured;
+    let Measured { blocks, seconds, stats, cycles, memory, allocations, hours, switches } = measured;
     let mut verdicts = Vec::new();
     let mut judge = |name: &str, passed: bool, detail: String| {
         verdicts.push(Verdict { name: name.to_owned(), passed, detail });
@@ -125,14 +126,20 @@ pub(super) fn report(soak: &Soak, measured: Measured) -> Report {
     if let Some(count) = allocations {
         judge("allocations", count == 0, format!("{count} while blocks were computed"));
     }
-    for ((name, first), (_, last)) in windows[0].all().into_iter().zip(windows[1].all()) {
-        let (Some(first), Some(last)) = (first, last) else { continue };
-        let scale = if name == "support_foot_speed" { first.abs().max(SUPPORT) } else { first.abs() };
-        if soak.hours < DRIFT_HOURS {
-            break;
-        }
-        let drift = (last - first).abs() / scale.max(1e-9);
-        judge(name, drift <= DRIFT, format!("{first:.4} at first, {last:.4} at last, {:.1} %", 100.0 * drift));
+    let judged = if soak.hours < DRIFT_HOURS { &[] } else { cycles.as_slice() };
+    for (i, (name, _)) in Figures::default().all().into_iter().enumerate() {
+        let values: Option<Vec<f64>> = judged.iter().map(|cycle| cycle.all()[i].1).collect();
+        let Some(drift) = values.as_deref().and_then(Drift::of) else { continue };
+        let scale = if name == "support_foot_speed" { drift.first.abs().max(SUPPORT) } else { drift.first.abs() };
+        let (scale, difference) = (scale.max(1e-9), drift.last - drift.first);
+        let detail = format!(
+            "{:.4} in the first half, {:.4} in the last: {:+.1} % (standard error {:.1} %)",
+            drift.first,
+            drift.last,
+            100.0 * difference / scale,
+            100.0 * drift.error / scale
+        );
+        judge(name, drift.beyond_chance(scale) <= DRIFT, detail);
     }
     let detail = format!(
         "{} frames differ {:.1} days later",
@@ -166,7 +173,7 @@ pub(super) fn report(soak: &Soak, measured: Measured) -> Report {
         allocations,
         hours_apart: hours,
         switch_seam: switches,
-        windows,
+        cycles,
         verdicts,
     }
 }

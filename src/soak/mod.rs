@@ -8,7 +8,7 @@
 //! |---|---|
 //! | memory | resident memory, pages of files excepted, does not grow by more than 1 % over what it was in the second and third tenth of the run; a quarter of an hour is the least that says something, since voices fill their rings for a minute |
 //! | allocations | computing a block allocates nothing after the first cycle's tenth (where the caller can count) |
-//! | each metric (soaks of half an hour and more) | over the last ten minutes within 15 % of the first ten; the supporting foot's speed within 15 % of 2 cm/s where it is lower |
+//! | each metric (soaks of four cycles and more) | the mean over the last half of the cycles within 15 % of that over the first half, plus two standard errors of their difference, told from the spread within the halves (`drift`); the supporting foot's speed within 15 % of 2 cm/s where it is lower |
 //! | period | the same noise and inputs 2^24 blocks (26 days) later give the same motion, bit for bit, over 40 blocks |
 //! | precision | a day later the joints of one block on the same history are off by no more (root mean square: 1.5 times, and 5 mm) than some tokens later |
 //! | switches | where a governor's steps change the sampler the seam metric is at most 1.2 ([`crate::metrics::switch_seam`]) |
@@ -19,9 +19,11 @@
 //! | `script` | what happens when in a cycle |
 //! | `hours` | what the hour changes, and why free runs a day apart say nothing |
 //! | `switches` | motion that changes its sampler again and again |
+//! | `drift` | a metric's drift, told from the spread between cycles |
 //! | `window` | metrics over minutes of frames, in constant memory |
 //! | `judge` | verdicts |
 
+mod drift;
 mod hours;
 mod judge;
 mod script;
@@ -44,7 +46,7 @@ use window::Window;
 
 /// Blocks of an hour of motion.
 const HOUR: f64 = 3600.0 * FPS as f64 / BLOCK_FRAMES as f64;
-/// Seconds of a cycle, and of the windows that are compared.
+/// Seconds of a cycle.
 const CYCLE: f64 = 600.0;
 
 /// What is soaked.
@@ -90,7 +92,7 @@ impl Soak {
         let mut session = engine.session(options.clone())?;
         let mut second = engine.session(SessionOptions { seed: self.seed + 1, first_block: 0, ..options })?;
         let mut script = Script::new(voices, engine, self.sampler, cycle);
-        let mut windows = [Window::new(&engine.config().rig), Window::new(&engine.config().rig)];
+        let (mut window, mut cycles) = (Window::new(&engine.config().rig), Vec::new());
         let warm = (cycle / 10).max(10);
         let (mut allocated, mut memory) = (0, judge::Memory::default());
         let started = Instant::now();
@@ -105,11 +107,9 @@ impl Soak {
             if let Some(last) = frames.last() {
                 script.see(last.root);
             }
-            let user = script.user();
-            for (window, wanted) in windows.iter_mut().zip([block < cycle, block >= blocks - cycle]) {
-                if wanted {
-                    window.take(frames, user);
-                }
+            window.take(frames, script.user());
+            if block % cycle == cycle - 1 {
+                cycles.push(window.finish());
             }
             if block % 8 == 0 {
                 besides(&mut second, block)?;
@@ -123,12 +123,12 @@ impl Soak {
         let seconds = started.elapsed().as_secs_f64();
         let stats = session.stats();
         let hours = Hours::measure(engine, voices, self.sampler)?;
-        let switches = switches::measure(engine, voices)?;
+        let switches = switches::measure(engine, voices, switches::SWITCHES)?;
         let measured = judge::Measured {
             blocks,
             seconds,
             stats,
-            windows: windows.map(|window| window.finish()),
+            cycles,
             memory,
             allocations: allocations.map(|_| allocated),
             hours,

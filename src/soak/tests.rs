@@ -1,4 +1,5 @@
 use super::*;
+use crate::audio::Wav;
 use crate::frame::Sampler;
 
 fn tiny() -> Arc<Engine> {
@@ -17,9 +18,9 @@ fn a_short_soak_measures_everything() {
     let soak = Soak { hours: 0.15, from_hour: 24.0, seed: 3, sampler: Sampler::Midpoint(2) };
     let mut told = Vec::new();
     let report = soak.run(&tiny(), &voices(), None, &mut |hours| told.push(hours)).unwrap();
-    assert_eq!((report.blocks, report.windows.len()), (4050, 2));
+    assert_eq!((report.blocks, report.cycles.len()), (4050, 3));
     assert!(told.len() > 60 && told.windows(2).all(|w| w[0] < w[1]));
-    assert!(report.windows.iter().all(|w| w.all().iter().all(|(_, v)| v.is_some_and(f64::is_finite))), "{report:?}");
+    assert!(report.cycles.iter().all(|w| w.all().iter().all(|(_, v)| v.is_some_and(f64::is_finite))), "{report:?}");
     let hours = report.hours_apart;
     assert!(hours.period_frames_that_differ == 0 && hours.tokens_later[0] > 0.0, "{hours:?}");
     let passed = |name: &str| report.verdicts.iter().any(|v| v.name == name && v.passed);
@@ -27,6 +28,17 @@ fn a_short_soak_measures_everything() {
     let names: Vec<_> = report.verdicts.iter().map(|v| v.name.as_str()).collect();
     assert!(names.ends_with(&["period", "precision", "switches", "guard"]), "{names:?}");
     assert!(serde_json::to_string(&report).unwrap().contains("\"verdicts\""));
+}
+
+/// The model that is shipped, on the sample conversation, up and down the ladder: 40 switches, the same on every computer.
+#[test]
+fn the_shipped_model_hides_its_switches() {
+    let file = |name: &str| format!("{}/{name}", env!("CARGO_MANIFEST_DIR"));
+    let voice = |name: &str| Wav::parse(&std::fs::read(file(name)).unwrap()).unwrap().to_24k().unwrap();
+    let voices = Voices::new(voice("samples/agent.wav").to_vec(), voice("samples/user.wav").to_vec()).unwrap();
+    let engine = Engine::load(file("models/visavis-base.safetensors")).unwrap();
+    let seam = switches::measure(&engine, &voices, 40).unwrap().unwrap();
+    assert!(seam > 0.3 && seam <= judge::SWITCH_SEAM, "seam metric {seam} where the sampler changes");
 }
 
 #[test]
@@ -50,12 +62,12 @@ fn drift_growth_and_allocations_fail() {
     };
     let fine = Hours { tokens_later: [1e-5, 1e-4], day_later: [1.4e-5, 2e-2], ..Hours::default() };
     let with = |last: Figures, allocations: u64, hours: Hours| {
-        let windows = [figures(0.5, 0.001), last];
+        let first = figures(0.5, 0.001);
         let measured = judge::Measured {
             blocks: 1,
             seconds: 1.0,
             stats,
-            windows,
+            cycles: vec![first, first, last, last],
             memory: judge::Memory::default(),
             allocations: Some(allocations),
             hours,

@@ -103,10 +103,12 @@ impl Window {
         self.recording.user.clear();
     }
 
-    pub(super) fn finish(mut self) -> Figures {
+    /// Figures of all frames since the last call.
+    pub(super) fn finish(&mut self) -> Figures {
         self.measure();
+        let sums = std::mem::take(&mut self.sums);
         let mean = |i: usize| {
-            let (sum, weight) = self.sums[i];
+            let (sum, weight) = sums[i];
             (weight > 0.0).then(|| sum / weight)
         };
         Figures {
