@@ -7,6 +7,9 @@ use std::path::Path;
 
 /// Most channels that are mixed down.
 const MAX_CHANNELS: u16 = 8;
+/// Loudest sample of a float file, full scale 1: as loud as a 32-bit number read without its scale. What is far beyond is no sound, and
+/// adding channels or filtering would make infinities of it.
+const LOUDEST: f32 = (1u64 << 32) as f32;
 /// Longest file that is read, bytes.
 const MAX_BYTES: u64 = 1 << 30;
 
@@ -25,7 +28,7 @@ impl Wav {
     ///
     /// # Errors
     /// [`ErrorKind::Io`] when the file cannot be read; [`ErrorKind::Audio`], naming the file, when it is empty, not WAV,
-    /// of a format not listed above, cut off (fewer samples than its header says), or holds NaN or infinity.
+    /// of a format not listed above, cut off (fewer samples than its header says), or holds NaN, infinity or what is no sound.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = crate::bounded::read(path, MAX_BYTES).map_err(|e| Error::io("read the sound file", path, e))?;
@@ -102,6 +105,12 @@ fn mix(
         let value = value.map_err(|e| decode_error(&e))?;
         if !value.is_finite() {
             return Err(bad(format!("sample {} is not a finite number; export the sound again", out.len())));
+        }
+        if value.abs() > LOUDEST {
+            return Err(bad(format!(
+                "sample {} is {value:e} where full scale is 1; export the sound again",
+                out.len()
+            )));
         }
         sum += value;
         count += 1;
@@ -246,6 +255,7 @@ mod tests {
         refused(&file(1, 192_001, 16, SampleFormat::Int, &SAMPLES), "192001 Hz");
         refused(&file(1, 16_000, 32, SampleFormat::Float, &[0.0, f32::NAN]), "sample 1");
         refused(&file(1, 16_000, 32, SampleFormat::Float, &[f32::INFINITY]), "sample 0");
+        refused(&file(1, 16_000, 32, SampleFormat::Float, &[0.0, -3e38]), "sample 1 is -3e38");
         let mut zero = file(1, 16_000, 16, SampleFormat::Int, &SAMPLES);
         zero[24..32].fill(0);
         refused(&zero, "0 Hz");
@@ -281,6 +291,16 @@ mod tests {
         }
         refused(&bytes[..bytes.len() - 1], "cut off");
         refused(&bytes[..40], "cut off before");
+    }
+
+    #[test]
+    fn the_loudest_stay_finite() {
+        for channels in [1, 8] {
+            let bytes =
+                file(channels, 48_000, 32, SampleFormat::Float, &[LOUDEST, -LOUDEST, LOUDEST, LOUDEST].repeat(20));
+            let wav = Wav::parse(&bytes).unwrap();
+            assert!(wav.samples.iter().chain(&wav.to_24k().unwrap()).all(|s| s.is_finite()));
+        }
     }
 
     #[test]
