@@ -168,12 +168,16 @@ impl Caller {
                 }
                 Call::Finish(voice) => visavis_session_finish_audio(session, voice % 4),
                 Call::Clear(voice) => visavis_session_clear_audio(session, voice % 4),
-                Call::Present(voice, present) => visavis_session_set_audio_present(session, i32::from(voice % 4), present),
+                Call::Present(voice, present) => {
+                    visavis_session_set_audio_present(session, i32::from(voice % 4), present)
+                }
                 Call::Head([x, y, z], time) => visavis_session_push_user_head(session, x, y, z, time),
                 Call::Gaze(target) => visavis_session_set_gaze(session, target),
                 Call::NaturalGaze => visavis_session_set_natural_gaze(session),
                 Call::Guidance(weight, gaze) => visavis_session_set_guidance(session, weight, gaze),
-                Call::Sampler(kind, steps) => visavis_session_set_sampler(session, i32::from(kind % 4), u32::from(steps)),
+                Call::Sampler(kind, steps) => {
+                    visavis_session_set_sampler(session, i32::from(kind % 4), u32::from(steps))
+                }
                 Call::Poll { now, frame_size, joints, pointers } => self.poll(now, frame_size, joints, pointers),
                 Call::Due { pointers } => {
                     let mut time = 0.0;
@@ -187,7 +191,12 @@ impl Caller {
                 Call::ThreadIds { capacity, pointers } => {
                     let (mut ids, mut count) = ([0u32; 256], 0usize);
                     let ids = pointer(ids.as_mut_ptr(), pointers, 0);
-                    visavis_session_worker_thread_ids(session, ids, usize::from(capacity), pointer(&mut count, pointers, 1))
+                    visavis_session_worker_thread_ids(
+                        session,
+                        ids,
+                        usize::from(capacity),
+                        pointer(&mut count, pointers, 1),
+                    )
                 }
                 Call::Stats { size, null } => {
                     let mut room = [u64::from_ne_bytes([CANARY; 8]); 128];
@@ -201,7 +210,8 @@ impl Caller {
                 Call::Joint { joint, pointers } => {
                     let (mut parent, mut offset) = (0, [0.0f32; 3]);
                     visavis_engine_joint_name(self.engine, joint);
-                    let (parent, offset) = (pointer(&mut parent, pointers, 0), pointer(offset.as_mut_ptr(), pointers, 1));
+                    let (parent, offset) =
+                        (pointer(&mut parent, pointers, 0), pointer(offset.as_mut_ptr(), pointers, 1));
                     visavis_engine_joint(pointer(self.engine, pointers, 2), joint % 64, parent, offset)
                 }
                 Call::OpenXr(joint, body) => {

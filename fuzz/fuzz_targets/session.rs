@@ -5,9 +5,9 @@
 use arbitrary::{Arbitrary, Unstructured};
 use glam::Vec3;
 use libfuzzer_sys::fuzz_target;
+use std::cell::RefCell;
 use visavis::error::ErrorKind;
 use visavis::frame::{Root, Sampler};
-use std::cell::RefCell;
 use visavis::session::{Anchoring, Budget, Governor, Session, SessionOptions};
 use visavis_fuzz::{engine, student};
 

@@ -31,9 +31,10 @@ impl Parts {
 
     /// A sound container; `None` when a tensor's data do not fit its shape.
     pub fn bytes(&self) -> Option<Vec<u8>> {
-        let views = self.tensors.iter().map(|(n, (dtype, shape, data))| {
-            Some((n.as_str(), TensorView::new(*dtype, shape.clone(), data).ok()?))
-        });
+        let views = self
+            .tensors
+            .iter()
+            .map(|(n, (dtype, shape, data))| Some((n.as_str(), TensorView::new(*dtype, shape.clone(), data).ok()?)));
         let views: Vec<_> = views.collect::<Option<_>>()?;
         let metadata = HashMap::from([(CONFIG_KEY.to_owned(), self.config.to_string())]);
         safetensors::serialize(views, Some(metadata)).ok()
