@@ -9,11 +9,12 @@
 #
 # No nightly toolchain: flags that stable compilers accept with RUSTC_BOOTSTRAP. `kernels` (address) is the shortest part;
 # `full` runs all tests of the library and of tests/ but those that put processes under limits of their own. A toolchain
-# without the sanitizer's runtime is skipped with a note.
+# without the sanitizer's runtime is skipped with a note. The standard library is the toolchain's own, not rebuilt with the sanitizer: that
+# takes the sources of the standard library (rust-src) and -Zbuild-std. Each kind builds the crate anew, in target/sanitize/.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 kind=${1:-}
-case $kind in address | thread | realtime) ;; *) sed -n '2,13s/^# \{0,1\}//p' "$0"; exit 2 ;; esac
+case $kind in address | thread | realtime) ;; *) sed -n '2,14s/^# \{0,1\}//p' "$0"; exit 2 ;; esac
 
 host=$(rustc -vV | sed -n 's/^host: //p')
 names=(address=asan thread=tsan realtime=rtsan)
