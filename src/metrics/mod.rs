@@ -68,3 +68,11 @@ fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let (sum, n) = values.into_iter().fold((0.0, 0_usize), |(sum, n), v| (sum + v, n + 1));
     (n > 0).then(|| sum / n as f64)
 }
+
+/// Arithmetic mean of two values or more, and the square of its standard error: variance (n - 1) over n.
+pub(crate) fn mean_and_error2(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let square = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>();
+    (mean, square / (n - 1.0) / n)
+}

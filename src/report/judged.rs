@@ -1,6 +1,7 @@
 //! Every metric of `visavis eval` side by side: the JSON that it wrote for the reference and for each candidate.
 
 use crate::error::{Error, ErrorKind, Result};
+use crate::metrics::mean_and_error2;
 use serde::Serialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -85,11 +86,9 @@ fn changes(reference: &Value, other: &Value) -> Vec<FgdChange> {
             row["all"]["fgd_batches"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect()
         };
         let (a, b) = (batches(old), batches(row));
-        let n = a.len() as f64;
         let error = (a.len() > 1 && a.len() == b.len()).then(|| {
             let apart: Vec<f64> = a.iter().zip(&b).map(|(a, b)| b - a).collect();
-            let mean = apart.iter().sum::<f64>() / n;
-            (apart.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt() / d
+            mean_and_error2(&apart).1.sqrt() / d
         });
         Some(FgdChange { sampler: row["name"].as_str()?.to_owned(), reference: d, change: (new - d) / d, error })
     };

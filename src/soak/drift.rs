@@ -5,6 +5,8 @@
 //! chance does not explain: all but two standard errors, which come from the spread of the cycles *within* the halves and so do not
 //! grow with the drift itself. The longer the soak, the less there is to excuse.
 
+use crate::metrics::mean_and_error2;
+
 /// Standard errors of a difference that chance explains: one in twenty is larger.
 const ERRORS: f64 = 2.0;
 /// Cycles of each half at least.
@@ -26,8 +28,8 @@ impl Drift {
         if half < CYCLES {
             return None;
         }
-        let (first, first_error) = mean(&values[..half]);
-        let (last, last_error) = mean(&values[values.len() - half..]);
+        let (first, first_error) = mean_and_error2(&values[..half]);
+        let (last, last_error) = mean_and_error2(&values[values.len() - half..]);
         Some(Self { first, last, error: libm::sqrt(first_error + last_error) })
     }
 
@@ -35,14 +37,6 @@ impl Drift {
     pub(super) fn beyond_chance(&self, scale: f64) -> f64 {
         ((self.last - self.first).abs() - ERRORS * self.error).max(0.0) / scale
     }
-}
-
-/// Mean, and the square of its standard error.
-fn mean(values: &[f64]) -> (f64, f64) {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let square = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>();
-    (mean, square / (n - 1.0) / n)
 }
 
 #[cfg(test)]
