@@ -5,7 +5,8 @@ use std::arch::x86_64::*;
 
 use super::{GROUP, Geometry, Job, NR, Tile};
 
-/// Bytes ahead of each panel that are asked for; at its end, those of the panel that this thread reads next.
+/// Bytes ahead of each panel that are asked for; at its end, those of the panel that this thread reads next. These panels are asked for
+/// too, all the way, into the second-level cache: four panels alone are too few streams for the memory.
 const AHEAD: usize = 1024;
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
@@ -53,13 +54,14 @@ fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, ti
     let sums = &job.sums[row * groups..][..R * groups];
     let low = _mm512_set1_epi8(15);
     // The next panels of this tile, or those of the next tile.
-    let next = if p + P < job.panels { (P * panel) as isize } else { job.next - (p * panel) as isize } - panel as isize;
+    let next = if p + P < job.panels { (P * panel) as isize } else { job.next - (p * panel) as isize };
     let mut total = [[_mm512_setzero_ps(); P]; R];
     for g in 0..groups {
         let at = Geometry::nibbles(g);
-        let ahead = if at + AHEAD < panel { at as isize } else { next + at as isize };
-        // May point anywhere.
+        let ahead = if at + AHEAD < panel { at as isize } else { next + at as isize - panel as isize };
+        // May point anywhere, both.
         let far = weights.wrapping_offset(ahead + AHEAD as isize);
+        let later = weights.wrapping_offset(next + at as isize);
         let start: [i32; R] = std::array::from_fn(|r| -8 * sums[r * groups + g]);
         for c in 0..P {
             let mut acc: [__m512i; R] = start.map(|s| _mm512_set1_epi32(s));
@@ -67,6 +69,7 @@ fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, ti
                 // SAFETY: line j of group g of panel c, within the slice; a prefetch may point anywhere.
                 let w = unsafe {
                     _mm_prefetch::<_MM_HINT_T0>(far.wrapping_add(c * panel + j * 64).cast());
+                    _mm_prefetch::<_MM_HINT_T1>(later.wrapping_add(c * panel + j * 64).cast());
                     _mm512_loadu_si512(weights.add(c * panel + at + j * 64).cast())
                 };
                 let (a, b) = (_mm512_and_si512(w, low), _mm512_and_si512(_mm512_srli_epi16::<4>(w), low));
@@ -83,6 +86,7 @@ fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, ti
             // SAFETY: the 16 scales of group g of panel c; a prefetch may point anywhere.
             let scale = _mm512_cvtph_ps(unsafe {
                 _mm_prefetch::<_MM_HINT_T0>(far.wrapping_add(c * panel + 256).cast());
+                _mm_prefetch::<_MM_HINT_T1>(later.wrapping_add(c * panel + 256).cast());
                 _mm256_loadu_si256(scales.add(c * panel / 2 + Geometry::scales(g)).cast())
             });
             for (total, acc) in total.iter_mut().zip(acc) {
