@@ -15,36 +15,40 @@ const AHEAD: usize = 16;
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
 pub(super) fn run(job: &Job<'_>, tile: &mut Tile<i32>) {
     job.check();
-    for_rows!(job.rows, R => rows::<R>(job, tile))
+    // Of more rows than two panels have accumulators for, two portions: the second finds the weights in the cache.
+    let portion = if job.rows > 12 { job.rows.div_ceil(2) } else { job.rows };
+    for row in (0..job.rows).step_by(portion) {
+        for_rows!(portion.min(job.rows - row), R => rows::<R>(job, row, tile));
+    }
 }
 
-/// As many panels at once as accumulators fit 24 registers.
+/// Rows from `row`; as many panels at once as accumulators fit 24 registers.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
-fn rows<const R: usize>(job: &Job<'_>, tile: &mut Tile<i32>) {
+fn rows<const R: usize>(job: &Job<'_>, row: usize, tile: &mut Tile<i32>) {
     let mut p = 0;
     while R <= 6 && p + 4 <= job.panels {
-        block::<R, 4>(job, p, tile);
+        block::<R, 4>(job, row, p, tile);
         p += 4;
     }
     while R <= 12 && p + 2 <= job.panels {
-        block::<R, 2>(job, p, tile);
+        block::<R, 2>(job, row, p, tile);
         p += 2;
     }
     while p < job.panels {
-        block::<R, 1>(job, p, tile);
+        block::<R, 1>(job, row, p, tile);
         p += 1;
     }
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
-fn block<const R: usize, const P: usize>(job: &Job<'_>, p: usize, tile: &mut Tile<i32>) {
+fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<i32>) {
     let padded = job.geo.padded;
     let weights = job.weights[(job.first + p) * job.geo.panel..][..P * job.geo.panel].as_ptr();
-    let q = job.q[..R * job.stride].as_ptr();
+    let q = job.q[row * job.stride..][..R * job.stride].as_ptr();
     let groups = padded / GROUP;
     let mut acc = [[_mm512_setzero_si512(); P]; R];
     for (r, acc) in acc.iter_mut().enumerate() {
-        let sum: i32 = job.sums[r * groups..][..groups].iter().sum();
+        let sum: i32 = job.sums[(row + r) * groups..][..groups].iter().sum();
         *acc = [_mm512_set1_epi32(-128 * sum); P];
     }
     let quads = padded / 4;
@@ -75,7 +79,7 @@ fn block<const R: usize, const P: usize>(job: &Job<'_>, p: usize, tile: &mut Til
     }
     for (r, acc) in acc.iter().enumerate() {
         for (c, acc) in acc.iter().enumerate() {
-            let out = &mut tile[r][(p + c) * NR..][..NR];
+            let out = &mut tile[row + r][(p + c) * NR..][..NR];
             // SAFETY: 16 values at `out`.
             unsafe { _mm512_storeu_si512(out.as_mut_ptr().cast(), *acc) };
         }
