@@ -1,7 +1,7 @@
 //! Frechet distance between two Gaussians fitted to pose distributions (FGD, FGD_acc).
 
 use super::linalg::{eigen, multiply, sqrt};
-use super::{Moments, mean};
+use super::Moments;
 
 /// Frechet distance (squared 2-Wasserstein distance of the fitted Gaussians; Dowson and Landau 1982, as used by FGD):
 /// `|m1 - m2|² + tr(S1 + S2 - 2 (S1^½ S2 S1^½)^½)`.
@@ -22,12 +22,6 @@ pub fn frechet(a: &Moments, b: &Moments) -> Option<f64> {
     symmetrise(&mut inner, n);
     let cross: f64 = eigen(&inner, n).0.iter().map(|v| v.max(0.0).sqrt()).sum();
     Some((means + trace(&cov_a) + trace(&cov_b) - 2.0 * cross).max(0.0))
-}
-
-/// Mean of the Frechet distances of pairs of batches (the "Avg" column of SARAH's table 1).
-pub fn mean_frechet<'a>(batches: impl IntoIterator<Item = (&'a Moments, &'a Moments)>) -> Option<f64> {
-    let distances: Option<Vec<f64>> = batches.into_iter().map(|(a, b)| frechet(a, b)).collect();
-    mean(distances?)
 }
 
 fn symmetrise(m: &mut [f64], n: usize) {
@@ -85,14 +79,6 @@ mod tests {
         let want = 5.0 + 5.0 - 2.0 * (12.5_f64 + 8.0).sqrt();
         close(frechet(&a, &b).unwrap(), want, 1e-10);
         close(frechet(&b, &a).unwrap(), want, 1e-10);
-    }
-
-    #[test]
-    fn batches_are_averaged() {
-        let a = gaussian([0.0, 0.0], [1.0, 1.0], 0.0);
-        let (b, c) = (gaussian([1.0, 0.0], [1.0, 1.0], 0.0), gaussian([3.0, 0.0], [1.0, 1.0], 0.0));
-        close(mean_frechet([(&a, &b), (&a, &c)]).unwrap(), 5.0, 1e-10);
-        assert_eq!(mean_frechet([(&a, &Moments::new(2))]), None);
     }
 
     #[test]

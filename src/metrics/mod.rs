@@ -37,7 +37,7 @@ mod testing;
 pub use beat::{Beat, beat};
 pub use bones::{BoneDeviation, bone_deviation};
 pub use feet::{CONTACT_HEIGHT, SLIDE_SPEED, foot_clearances, foot_slide, support_foot_speed};
-pub use frechet::{frechet, mean_frechet};
+pub use frechet::frechet;
 pub use gaze::{gaze_score, gaze_scores, head_angle};
 pub use keypoints::{Space, ape, pck};
 pub use moments::{Moments, acceleration_moments, pose_moments};
