@@ -98,7 +98,7 @@ fn pass(c: &mut Criterion) {
 fn attend(c: &mut Criterion) {
     for (size, dim, len) in [("flow_paper", 1024, 100), ("decoder_paper", 256, 160), ("flow_base", 384, 32)] {
         for dtype in [KvDtype::F16, KvDtype::F32] {
-            let mut cache = KvCache::new(2, len, dim, dtype);
+            let mut cache = KvCache::new(2, len, 4, dim, dtype);
             let row = vec![0.3; dim];
             for position in 0..len as u64 {
                 cache.write(0, position, &row, &row);
@@ -111,7 +111,7 @@ fn attend(c: &mut Criterion) {
                     let spans = [0, 0, 1, 1].map(|ring| Span { ring, first: 7, len: len as u32 });
                     let (q, mut y) = (vec![0.1; 4 * 3 * dim], vec![0.0; 4 * dim]);
                     group.bench_function(BenchmarkId::new(kernels.level().name(), threads), |b| {
-                        b.iter(|| exec.attend(black_box(&q), 3 * dim, 4, &cache, &spans, &mut y));
+                        b.iter(|| exec.attend(black_box(&q), 3 * dim, &cache, &spans, &mut y));
                     });
                 }
             }

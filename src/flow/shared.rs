@@ -108,7 +108,7 @@ impl SharedPass {
                 let mut from = 0;
                 for generator in members.iter_mut().flatten().map(generator) {
                     let (qkv, out) = (&qkv[from * 3 * d..], &mut out[from * d..]);
-                    from += generator.part().map_or(0, |part| part.slots.attend(exec, l, heads, qkv, out));
+                    from += generator.part().map_or(0, |part| part.slots.attend(exec, l, qkv, out));
                 }
             });
         }

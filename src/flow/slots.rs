@@ -88,7 +88,7 @@ impl Slots {
             branches,
             slots: taus.iter().map(|(h, _)| Slot { tau_history: *h, committed: 0, start: 0 }).collect(),
             modulation: Arc::new(net.modulation(exec, &all)),
-            cache: KvCache::new(taus.len() * branches.count() * c.layers, capacity as usize, d, dtype),
+            cache: KvCache::new(taus.len() * branches.count() * c.layers, capacity as usize, c.heads, d, dtype),
             gaze: false,
             layers: c.layers,
             window,
@@ -232,16 +232,9 @@ impl Slots {
     }
 
     /// The attention of the staged rows in layer `layer`; returns their number.
-    pub(super) fn attend(
-        &mut self,
-        exec: &mut Exec,
-        layer: usize,
-        heads: usize,
-        qkv: &[f32],
-        out: &mut [f32],
-    ) -> usize {
+    pub(super) fn attend(&mut self, exec: &mut Exec, layer: usize, qkv: &[f32], out: &mut [f32]) -> usize {
         let (n, d) = (self.rows.len(), self.cache.dim());
-        self.rows.attend(exec, layer, heads, &mut self.cache, &qkv[..n * 3 * d], &mut out[..n * d]);
+        self.rows.attend(exec, layer, &mut self.cache, &qkv[..n * 3 * d], &mut out[..n * d]);
         n
     }
 
@@ -298,7 +291,7 @@ impl Slots {
         for (i, layer) in net.layers.iter().enumerate() {
             let norms = modulation.layer(i, mod_index);
             layer.run(exec, heads, norms, phases, n, scratch, x, &mut |exec, qkv, out| {
-                rows.attend(exec, i, heads, cache, qkv, out);
+                rows.attend(exec, i, cache, qkv, out);
             });
         }
         self.finish(exec, net, history, slot, commit, new.is_some());

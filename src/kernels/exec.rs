@@ -187,20 +187,9 @@ impl Exec {
 
     /// Attention: row r of `q` (`row_stride` values, of which the first `cache.dim()` are the heads' queries) over `spans[r]`,
     /// scores divided by sqrt(head_dim), into row r of `y` (`spans.len()` x `cache.dim()`).
-    pub fn attend(
-        &mut self,
-        q: &[f32],
-        row_stride: usize,
-        heads: usize,
-        cache: &KvCache,
-        spans: &[Span],
-        y: &mut [f32],
-    ) {
-        let (rows, dim) = (spans.len(), cache.dim());
-        assert!(
-            heads > 0 && dim.is_multiple_of(heads) && dim <= row_stride,
-            "attend: heads divide dim, dim fits a row"
-        );
+    pub fn attend(&mut self, q: &[f32], row_stride: usize, cache: &KvCache, spans: &[Span], y: &mut [f32]) {
+        let (rows, dim, heads, head_dim) = (spans.len(), cache.dim(), cache.heads(), cache.head_dim());
+        assert!(dim <= row_stride, "attend: dim fits a row");
         assert!(q.len() == rows * row_stride && y.len() == rows * dim, "attend: q is rows x row_stride, y rows x dim");
         for s in spans {
             assert!(
@@ -208,7 +197,6 @@ impl Exec {
                 "attend: span in the cache"
             );
         }
-        let head_dim = dim / heads;
         let kernels = &self.kernels;
         let y = Shared(y.as_mut_ptr());
         // Neighbouring rows often share a ring, so one piece is one head of up to 4 rows: its keys stay in the cache.
@@ -219,17 +207,17 @@ impl Exec {
                 let q = &q[r * row_stride + head * head_dim..][..head_dim];
                 // SAFETY: in y, and each row's head is in one piece.
                 let y = unsafe { y.part(r * dim + head * head_dim, head_dim) };
-                let (offset, span) = (head * head_dim, spans[r]);
+                let span = spans[r];
                 // SAFETY: a `Kernels` exists only for a level that this CPU has.
                 unsafe {
                     match &cache.store {
                         super::attend::Store::F16(k, v) => {
                             let (k, v) = (k.of(), v.of());
-                            (kernels.attend.run.f16)(&ring(cache, k, v, span, offset), q, y);
+                            (kernels.attend.run.f16)(&ring(cache, k, v, span, head), q, y);
                         }
                         super::attend::Store::F32(k, v) => {
                             let (k, v) = (k.of(), v.of());
-                            (kernels.attend.run.f32)(&ring(cache, k, v, span, offset), q, y);
+                            (kernels.attend.run.f32)(&ring(cache, k, v, span, head), q, y);
                         }
                     }
                 }
@@ -256,14 +244,13 @@ impl std::fmt::Debug for Exec {
     }
 }
 
-fn ring<'a, T>(cache: &KvCache, k: &'a [T], v: &'a [T], span: Span, offset: usize) -> Head<'a, T> {
-    let n = cache.capacity * cache.dim;
-    let at = span.ring as usize * n..(span.ring as usize + 1) * n;
+fn ring<'a, T>(cache: &KvCache, k: &'a [T], v: &'a [T], span: Span, head: usize) -> Head<'a, T> {
+    let from = cache.head(span.ring as usize, head);
+    let at = from..from + cache.capacity * cache.head_dim();
     Head {
         k: &k[at.clone()],
         v: &v[at],
-        stride: cache.dim,
-        offset,
+        dim: cache.head_dim(),
         capacity: cache.capacity,
         slot: cache.slot(span.first),
         len: span.len as usize,

@@ -196,7 +196,7 @@ fn attention_matches_f64_over_wrapped_rings() {
         let q = random.floats(rows * stride, 3.0);
         let last = capacity as u64 * 3 + 2;
         for dtype in [KvDtype::F16, KvDtype::F32] {
-            let mut cache = KvCache::new(3, capacity, dim, dtype);
+            let mut cache = KvCache::new(3, capacity, heads, dim, dtype);
             let mut tokens = Vec::new();
             for position in 0..=last {
                 let (k, v) = (random.floats(dim, 1.0), random.floats(dim, 1.0));
@@ -216,7 +216,7 @@ fn attention_matches_f64_over_wrapped_rings() {
                     let mut exec = Exec::new(kernels, threads, Limits { rows, width: dim }).unwrap();
                     let mut y = vec![9.0; rows * dim];
                     exec.begin();
-                    exec.attend(&q, stride, heads, &cache, &spans, &mut y);
+                    exec.attend(&q, stride, &cache, &spans, &mut y);
                     exec.end();
                     let first = first.get_or_insert_with(|| bits(&y));
                     assert_eq!(*first, bits(&y), "{dtype:?} {exec:?}");

@@ -1,7 +1,7 @@
 //! Frechet distance between two Gaussians fitted to pose distributions (FGD, FGD_acc).
 
-use super::linalg::{eigen, multiply, sqrt};
 use super::Moments;
+use super::linalg::{eigen, multiply, sqrt};
 
 /// Frechet distance (squared 2-Wasserstein distance of the fitted Gaussians; Dowson and Landau 1982, as used by FGD):
 /// `|m1 - m2|² + tr(S1 + S2 - 2 (S1^½ S2 S1^½)^½)`.

@@ -84,22 +84,14 @@ impl Rows {
 
     /// Writes the rows' keys and values of layer `layer` to `cache`, then attends over each row's span: `qkv` is `rows x 3d`, `out`
     /// `rows x d`.
-    pub fn attend(
-        &mut self,
-        exec: &mut Exec,
-        layer: usize,
-        heads: usize,
-        cache: &mut KvCache,
-        qkv: &[f32],
-        out: &mut [f32],
-    ) {
+    pub fn attend(&mut self, exec: &mut Exec, layer: usize, cache: &mut KvCache, qkv: &[f32], out: &mut [f32]) {
         let d = cache.dim();
         let base = self.base.iter().zip(&self.positions).zip(qkv.chunks_exact(3 * d));
         for (span, ((base, position), row)) in self.spans.iter_mut().zip(base) {
             span.ring = base + layer as u32;
             cache.write(span.ring as usize, *position, &row[d..2 * d], &row[2 * d..]);
         }
-        exec.attend(qkv, 3 * d, heads, cache, &self.spans, out);
+        exec.attend(qkv, 3 * d, cache, &self.spans, out);
     }
 }
 

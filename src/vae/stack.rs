@@ -72,7 +72,7 @@ impl Stack {
     pub(super) fn state(&self, dtype: KvDtype) -> StackState {
         let (n, d) = (self.tokens, self.config.width);
         StackState {
-            cache: KvCache::new(self.layers.len(), n * self.config.window_blocks, d, dtype),
+            cache: KvCache::new(self.layers.len(), n * self.config.window_blocks, self.config.heads, d, dtype),
             block: 0,
             first: 0,
             rows: Rows::with_capacity(n),
@@ -105,7 +105,7 @@ impl Stack {
             let heads = self.config.heads;
             let StackState { cache, rows, phases, scratch, x, .. } = &mut *state;
             layer.run(exec, heads, norms, phases, n as usize, scratch, x, &mut |exec, qkv, out| {
-                rows.attend(exec, i, heads, cache, qkv, out);
+                rows.attend(exec, i, cache, qkv, out);
             });
         }
         let (shift, scale) = self.final_norm.tables(d, index);

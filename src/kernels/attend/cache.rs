@@ -24,13 +24,14 @@ pub struct Span {
     pub len: u32,
 }
 
-/// `rings` rings of `capacity` tokens, each a key and a value row of `dim` values.
+/// `rings` rings of `capacity` tokens, each a key and a value of `dim` values: `heads` equal parts.
 ///
-/// A ring keeps the last `capacity` positions written to it; whoever reads a span knows that its tokens are still there.
+/// A head's keys of all tokens of a ring lie one after the other, as do its values, so attention reads streams. A ring keeps the last `capacity` positions written to it; whoever reads a span knows that its tokens are still there.
 pub struct KvCache {
     rings: usize,
     pub(crate) capacity: usize,
-    pub(crate) dim: usize,
+    heads: usize,
+    dim: usize,
     pub(crate) store: Store,
 }
 
@@ -44,15 +45,16 @@ impl KvCache {
     /// Allocates the cache, zeroed.
     ///
     /// # Panics
-    /// When `capacity` or `dim` is 0.
-    pub fn new(rings: usize, capacity: usize, dim: usize, dtype: KvDtype) -> Self {
+    /// When `capacity` or `dim` is 0, or `heads` does not divide `dim`.
+    pub fn new(rings: usize, capacity: usize, heads: usize, dim: usize, dtype: KvDtype) -> Self {
         assert!(capacity > 0 && dim > 0, "a ring holds at least one token of at least one value");
+        assert!(heads > 0 && dim.is_multiple_of(heads), "heads divide dim");
         let n = rings * capacity * dim;
         let store = match dtype {
             KvDtype::F16 => Store::F16(Buffer::new(2 * n), Buffer::new(2 * n)),
             KvDtype::F32 => Store::F32(Buffer::new(4 * n), Buffer::new(4 * n)),
         };
-        Self { rings, capacity, dim, store }
+        Self { rings, capacity, heads, dim, store }
     }
 
     /// Writes the key and value of `position` into a ring; f16 storage rounds to nearest even.
@@ -61,16 +63,18 @@ impl KvCache {
     /// When the ring does not exist, or `k` or `v` are not `dim` long.
     pub fn write(&mut self, ring: usize, position: u64, k: &[f32], v: &[f32]) {
         assert!(k.len() == self.dim && v.len() == self.dim, "a token's key and value have dim values");
-        let at = self.at(ring, position);
-        let dim = self.dim;
-        match &mut self.store {
-            Store::F16(keys, values) => {
-                keys.of_mut::<f16>()[at..at + dim].convert_from_f32_slice(k);
-                values.of_mut::<f16>()[at..at + dim].convert_from_f32_slice(v);
-            }
-            Store::F32(keys, values) => {
-                keys.of_mut()[at..at + dim].copy_from_slice(k);
-                values.of_mut()[at..at + dim].copy_from_slice(v);
+        let (n, slot) = (self.head_dim(), self.slot(position));
+        for (head, (k, v)) in k.chunks_exact(n).zip(v.chunks_exact(n)).enumerate() {
+            let at = self.head(ring, head) + slot * n;
+            match &mut self.store {
+                Store::F16(keys, values) => {
+                    keys.of_mut::<f16>()[at..at + n].convert_from_f32_slice(k);
+                    values.of_mut::<f16>()[at..at + n].convert_from_f32_slice(v);
+                }
+                Store::F32(keys, values) => {
+                    keys.of_mut()[at..at + n].copy_from_slice(k);
+                    values.of_mut()[at..at + n].copy_from_slice(v);
+                }
             }
         }
     }
@@ -80,7 +84,10 @@ impl KvCache {
     /// # Panics
     /// When a ring does not exist.
     pub fn copy_token(&mut self, from_ring: usize, to_ring: usize, position: u64) {
-        self.copy(self.at(from_ring, position), self.at(to_ring, position), self.dim);
+        let (n, slot) = (self.head_dim(), self.slot(position));
+        for head in 0..self.heads {
+            self.copy(self.head(from_ring, head) + slot * n, self.head(to_ring, head) + slot * n, n);
+        }
     }
 
     /// Copies all tokens from one ring to another.
@@ -88,7 +95,7 @@ impl KvCache {
     /// # Panics
     /// When a ring does not exist.
     pub fn copy_ring(&mut self, from_ring: usize, to_ring: usize) {
-        self.copy(self.at(from_ring, 0), self.at(to_ring, 0), self.capacity * self.dim);
+        self.copy(self.head(from_ring, 0), self.head(to_ring, 0), self.capacity * self.dim);
     }
 
     fn copy(&mut self, from: usize, to: usize, n: usize) {
@@ -118,14 +125,24 @@ impl KvCache {
         self.capacity
     }
 
-    /// Values of a key or value row.
+    /// Heads that share a key or a value.
+    pub fn heads(&self) -> usize {
+        self.heads
+    }
+
+    /// Values of a key or value: all heads'.
     pub fn dim(&self) -> usize {
         self.dim
     }
 
-    fn at(&self, ring: usize, position: u64) -> usize {
+    pub(crate) fn head_dim(&self) -> usize {
+        self.dim / self.heads
+    }
+
+    /// First value of a head in a ring; its tokens follow.
+    pub(crate) fn head(&self, ring: usize, head: usize) -> usize {
         assert!(ring < self.rings, "the cache has {} rings", self.rings);
-        (ring * self.capacity + self.slot(position)) * self.dim
+        (ring * self.heads + head) * self.capacity * self.head_dim()
     }
 
     /// Row of `position` in its ring.

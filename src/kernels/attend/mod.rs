@@ -26,12 +26,10 @@ pub(crate) const CHUNK: usize = 64;
 /// Keys and values of one ring, seen by one head.
 #[derive(Clone, Copy)]
 pub(crate) struct Head<'a, T> {
-    /// `capacity` rows of `stride` values.
+    /// `capacity` rows of `dim` values.
     pub(crate) k: &'a [T],
     pub(crate) v: &'a [T],
-    pub(crate) stride: usize,
-    /// First value of this head in a row.
-    pub(crate) offset: usize,
+    pub(crate) dim: usize,
     pub(crate) capacity: usize,
     /// Row of the first token; the others follow, going on at row 0 after the last.
     pub(crate) slot: usize,
@@ -47,8 +45,8 @@ impl<T> Head<'_, T> {
             self.len <= self.capacity && (self.len == 0 || self.slot < self.capacity),
             "attend: span fits the ring"
         );
-        assert!(self.offset + q.len() <= self.stride, "attend: heads fit a row");
-        let n = self.capacity * self.stride;
+        assert!(q.len() == self.dim, "attend: a query for this head");
+        let n = self.capacity * self.dim;
         assert!(self.k.len() >= n && self.v.len() >= n, "attend: rows exist");
     }
 
@@ -57,7 +55,7 @@ impl<T> Head<'_, T> {
     pub(crate) fn at(&self, t: usize) -> usize {
         let slot = self.slot + t;
         let slot = if slot >= self.capacity { slot - self.capacity } else { slot };
-        slot * self.stride + self.offset
+        slot * self.dim
     }
 }
 
