@@ -4,7 +4,7 @@ use crate::audio::{AudioEncoder, AudioWeights};
 use crate::bundle::{AudioSource, BundleFile, LoadMode, Tensors};
 use crate::config::Config;
 use crate::error::{Error, ErrorKind, Result};
-use crate::flow::{ConditionLayout, FlowNet, Nets};
+use crate::flow::{ConditionLayout, FlowNet, Nets, reference_times, student_times};
 use crate::frame::{BLOCK_FRAMES, Sampler};
 use crate::kernels::{Exec, Kernels, KvDtype, Limits};
 use crate::pose::feature_count;
@@ -29,12 +29,15 @@ pub struct Networks {
     pub student: bool,
     /// The encoder of motion. Without it sessions do not re-anchor, whatever [`crate::session::Anchoring`] says.
     pub encoder: bool,
+    /// The weights that make the modulation of any flow time, a fifth of a flow network. Without them sessions have the bundle's own flow times:
+    /// [`Sampler::Midpoint`], [`Sampler::Euler`] with 1, 2, 4 or 8 steps, [`Sampler::Single`], and [`crate::session::HistoryTime::Bundle`].
+    pub modulation: bool,
 }
 
 impl Default for Networks {
     /// All.
     fn default() -> Self {
-        Self { reference: true, student: true, encoder: true }
+        Self { reference: true, student: true, encoder: true, modulation: true }
     }
 }
 
@@ -132,7 +135,7 @@ impl Engine {
     /// use visavis::session::SessionOptions;
     ///
     /// // A headset that only ever makes a single step.
-    /// let small = Networks { reference: false, encoder: false, ..Networks::default() };
+    /// let small = Networks { reference: false, encoder: false, modulation: false, ..Networks::default() };
     /// let file = BundleFile::open("models/visavis-base-i8.safetensors")?;
     /// let engine = Engine::from_file_with(&file, Kernels::detect()?, small)?;
     /// let session = engine.session(SessionOptions { sampler: Sampler::Single, ..SessionOptions::default() })?;
@@ -169,22 +172,32 @@ impl Engine {
         let latent = config.vae.latent;
         let layout = ConditionLayout { audio_features: config.audio.features };
         let idle = Idle::read(t, features, latent)?;
-        let net = |prefix: &str, wanted: bool| {
+        let net = |prefix: &str, wanted: bool, times: Vec<f32>| {
             if !wanted {
                 t.skip(&format!("{prefix}."));
                 return Ok(None);
             }
-            FlowNet::load(t, kernels, &config.flow, latent, layout, prefix).map(Some)
+            let times = (!networks.modulation).then_some(times.as_slice());
+            FlowNet::load(t, kernels, &config.flow, latent, layout, prefix, times).map(Some)
         };
         // Tensors of a student that the config does not have are not skipped: they are an error.
-        let student = if config.student.is_some() { net("student", networks.student)? } else { None };
+        let student = config.student.map(|s| net("student", networks.student, student_times(s.tau_history)));
+        let student = student.transpose()?.flatten();
+        let flow_times = reference_times(Sampler::Midpoint(4), config.session.clean_history);
+        let flow = net("flow", networks.reference, flow_times)?;
         let audio_source = AudioSource::load(t, &config.audio)?;
-        let encoder = Encoder::load(t, kernels, &config.vae, features)?;
+        let encoder = match idle {
+            Idle::Latents(_) if !networks.encoder => {
+                t.skip("vae.encoder.");
+                None
+            }
+            _ => Some(Encoder::load(t, kernels, &config.vae, features)?),
+        };
         let mut engine = Self {
             audio: audio_source.pack(kernels, &config.audio)?,
             encoder: None,
             decoder: Decoder::load(t, kernels, &config.vae, features)?,
-            flow: net("flow", networks.reference)?,
+            flow,
             student,
             pose: Standard::load(t, "stats.pose", features)?,
             latent: Standard::load(t, "stats.latent", latent)?,
@@ -195,11 +208,12 @@ impl Engine {
             config,
         };
         t.finish()?;
-        engine.idle = match idle {
-            Idle::Frames(frames) => engine.encode(&encoder, &frames)?,
-            Idle::Latents(latents) => latents,
+        engine.idle = match (idle, &encoder) {
+            (Idle::Latents(latents), _) => latents,
+            (Idle::Frames(frames), Some(encoder)) => engine.encode(encoder, &frames)?,
+            (Idle::Frames(_), None) => Vec::new(),
         };
-        engine.encoder = networks.encoder.then_some(encoder);
+        engine.encoder = encoder.filter(|_| networks.encoder);
         Ok(engine)
     }
 

@@ -5,11 +5,13 @@ mod common;
 use common::{golden_path, tiny};
 use std::sync::Arc;
 use visavis::bundle::BundleFile;
+use visavis::config::CleanHistory;
 use visavis::engine::{Engine, Networks};
 use visavis::error::ErrorKind;
 use visavis::frame::Sampler;
-use visavis::kernels::Kernels;
-use visavis::session::{Anchoring, SessionOptions};
+use visavis::kernels::{Kernels, Scheme};
+use visavis::quant::{Options, quantise};
+use visavis::session::{Anchoring, HistoryTime, SessionOptions};
 
 fn load(networks: Networks) -> visavis::error::Result<Arc<Engine>> {
     let file = BundleFile::open(golden_path("tiny.safetensors")).expect("the tiny bundle opens");
@@ -36,6 +38,55 @@ fn what_is_left_makes_the_same_motion_in_less_memory() {
         assert!(a_motion == b_motion, "{networks:?}");
         assert!(a.stats().cache_bytes < b.stats().cache_bytes);
     }
+}
+
+/// A quantised copy of the tiny bundle: it holds latents of the idle clip, so a lean engine reads no encoder.
+fn quantised() -> Vec<u8> {
+    let file = BundleFile::open(golden_path("tiny.safetensors")).expect("the tiny bundle opens");
+    let options = Options { scheme: Scheme::I8, smallest: 0, keep: &[], calibration: None, budget: None };
+    quantise(&file, &options).expect("quantised").bytes
+}
+
+#[test]
+fn tables_of_flow_times_make_the_same_motion_without_their_weights() {
+    let bytes = quantised();
+    let load = |modulation, encoder| {
+        let networks = Networks { modulation, encoder, ..Networks::default() };
+        let file = BundleFile::from_slice(&bytes, "quantised");
+        Engine::from_file_with(&file, Kernels::detect().expect("kernels"), networks).expect("it loads")
+    };
+    let (whole, lean) = (load(true, true), load(false, false));
+    assert!(lean.weight_bytes() < whole.weight_bytes());
+    for sampler in [Sampler::Midpoint(4), Sampler::Midpoint(1), Sampler::Euler(4), Sampler::Single] {
+        let options = SessionOptions { sampler, anchoring: Anchoring::Never, ..Default::default() };
+        let [mut a, mut b] = [&lean, &whole].map(|engine| engine.session(options.clone()).expect("session"));
+        let blocks = |session: &mut _| {
+            let mut frames = common::poll_blocks(session, 12);
+            let other = if sampler == Sampler::Single { Sampler::Midpoint(2) } else { Sampler::Single };
+            session.set_sampler(other).expect("its flow times are in the table");
+            frames.extend(common::poll_blocks(session, 12));
+            frames
+        };
+        assert!(blocks(&mut a) == blocks(&mut b), "{sampler}");
+    }
+}
+
+#[test]
+fn flow_times_outside_the_table_take_the_weights() {
+    let lean = load(Networks { modulation: false, ..Networks::default() }).expect("it loads");
+    let clean = HistoryTime::Clean(CleanHistory { tau: 0.83, from: 0.4 });
+    for options in [
+        SessionOptions { sampler: Sampler::Euler(3), ..Default::default() },
+        SessionOptions { history: clean, ..Default::default() },
+    ] {
+        let refused = lean.session(options.clone()).expect_err("refused");
+        assert_eq!(refused.kind(), ErrorKind::Argument);
+        assert!(refused.to_string().contains("modulation weights"), "{refused}");
+        tiny().session(options).expect("an engine with the weights has them all");
+    }
+    let mut session = lean.session(SessionOptions::default()).expect("session");
+    session.set_sampler(Sampler::Euler(3)).expect_err("refused later too");
+    session.set_sampler(Sampler::Euler(8)).expect("on the grid");
 }
 
 #[test]

@@ -1,11 +1,15 @@
 //! Tensors that are drawn from their names instead of read: networks of sizes for which there is no bundle, to measure their speed.
 
 use super::{StoredData, StoredWeights};
+use crate::engine::IDLE_LATENTS;
+use crate::frame::BLOCK_FRAMES;
 use crate::kernels::{I4_GROUP, Scheme};
 use half::f16;
 
-/// Rows of a matrix that may have any number.
-pub(super) const ROWS: usize = 8;
+/// Rows of a matrix that may have any number: an idle clip of two blocks, a row a frame, or a block as latents.
+pub(super) fn rows(name: &str) -> usize {
+    if name == IDLE_LATENTS { 2 } else { 2 * BLOCK_FRAMES }
+}
 
 /// A stream of numbers that depends on a name alone.
 struct Source(u64);

@@ -14,6 +14,10 @@ const MAX_HEADER: u64 = 4 << 20;
 /// Longest file that is copied to memory, bytes.
 const MAX_COPY: u64 = 4 << 30;
 
+/// Smallest part that is worth a system call to let go of, bytes.
+#[cfg(all(unix, not(target_os = "android")))]
+const RELEASED: usize = 1 << 18;
+
 /// How a bundle's file is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum LoadMode {
@@ -122,6 +126,19 @@ impl<'a> BundleFile<'a> {
         }
     }
 
+    /// Lets go of the pages of `part`, a part of these bytes that has been read: if the file is mapped they leave this process's memory, and
+    /// reading them again would bring them back.
+    #[cfg_attr(target_os = "android", allow(unused_variables, clippy::unused_self, reason = "nothing is mapped there"))]
+    pub(super) fn release(&self, part: &[u8]) {
+        #[cfg(all(unix, not(target_os = "android")))]
+        if let (Bytes::Mapped(map), RELEASED..) = (&self.bytes, part.len()) {
+            let from = part.as_ptr().addr() - map.as_ptr().addr();
+            #[allow(unsafe_code, reason = "mapping a file is unsafe by nature")]
+            // SAFETY: nobody writes through the map, so its pages hold what the file holds, and are read from it again.
+            let _ = unsafe { map.unchecked_advise_range(memmap2::UncheckedAdvice::DontNeed, from, part.len()) };
+        }
+    }
+
     /// Parses the container and the config, and checks both.
     ///
     /// # Errors
@@ -144,7 +161,7 @@ impl<'a> BundleFile<'a> {
         let config = parse_config(&json)?;
         check::config(&config)?;
         let quantisation = config.quantisation.clone();
-        Ok((config, Tensors::new(tensors, quantisation)))
+        Ok((config, Tensors::new(self, tensors, quantisation)))
     }
 
     /// The config as JSON and the container; neither has been looked into.

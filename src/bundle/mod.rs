@@ -8,6 +8,7 @@ mod check;
 mod contents;
 mod drawn;
 mod file;
+mod read;
 mod rewrite;
 mod stored;
 mod tensors;

@@ -37,16 +37,22 @@ pub enum StoredData {
     },
 }
 
+impl StoredData {
+    /// The same, borrowed.
+    pub fn borrow(&self) -> WeightData<'_> {
+        match self {
+            Self::F32(w) => WeightData::F32(w),
+            Self::F16(w) => WeightData::F16(w),
+            Self::I8 { q, scale } => WeightData::I8 { q, scale },
+            Self::I4 { q, scale } => WeightData::I4 { q, scale },
+        }
+    }
+}
+
 impl StoredWeights {
     /// The same, borrowed.
     pub fn borrow(&self) -> Weights<'_> {
-        let data = match &self.data {
-            StoredData::F32(w) => WeightData::F32(w),
-            StoredData::F16(w) => WeightData::F16(w),
-            StoredData::I8 { q, scale } => WeightData::I8 { q, scale },
-            StoredData::I4 { q, scale } => WeightData::I4 { q, scale },
-        };
-        Weights { rows: self.rows, cols: self.cols, data }
+        Weights { rows: self.rows, cols: self.cols, data: self.data.borrow() }
     }
 
     /// Their scheme.
@@ -59,20 +65,23 @@ impl StoredWeights {
         self.borrow().to_f32()
     }
 
-    /// Columns `range` of float weights, packed; int8 and int4 weights are packed as floats of the same values.
+    /// Columns `range` of weights whose values are `floats`, packed: half floats as they are, all others as floats.
     pub(crate) fn pack_columns(
         &self,
+        floats: &[f32],
         kernels: Kernels,
         range: std::ops::RangeFrom<usize>,
         bias: Option<&[f32]>,
     ) -> Matrix {
         fn cut<T: Copy>(w: &[T], cols: usize, from: usize) -> Vec<T> {
-            w.chunks_exact(cols).flat_map(|row| &row[from..]).copied().collect()
+            let mut cut = Vec::with_capacity(w.len() / cols * (cols - from));
+            w.chunks_exact(cols).for_each(|row| cut.extend_from_slice(&row[from..]));
+            cut
         }
         let (rows, cols, from) = (self.rows, self.cols, range.start);
         let data = match &self.data {
             StoredData::F16(w) => StoredData::F16(cut(w, cols, from)),
-            _ => StoredData::F32(cut(&self.to_f32(), cols, from)),
+            _ => StoredData::F32(cut(floats, cols, from)),
         };
         kernels.pack(Self { rows, cols: cols - from, data }.borrow(), bias)
     }

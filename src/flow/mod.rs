@@ -9,7 +9,8 @@
 //! |---|---|
 //! | `condition` | what a token is told: user, two voices, gaze, each present or absent |
 //! | `history` | latents, noise and conditioning of the last tokens |
-//! | `network` | weights; embeddings, modulation tables |
+//! | `network` | weights; embeddings |
+//! | `modulation` | shifts, scales and gates of flow times |
 //! | `slots` | one cache a slot; passes over a few rows |
 //! | `sampler` | midpoint, Euler and single-step integration with guidance |
 //! | `shared` | passes that several generators share |
@@ -19,6 +20,7 @@
 
 mod condition;
 mod history;
+mod modulation;
 mod network;
 mod noise;
 mod sampler;
@@ -27,8 +29,9 @@ mod slots;
 
 pub use condition::{Condition, ConditionLayout};
 pub use history::History;
-pub use network::{FlowNet, Modulation};
+pub use modulation::Modulation;
+pub use network::FlowNet;
 pub use noise::{normal, uniform};
-pub use sampler::{Generator, GeneratorOptions, Guidance, Nets, X1Tap};
+pub use sampler::{Generator, GeneratorOptions, Guidance, Nets, X1Tap, reference_times, student_times};
 pub use shared::{SHARED_ROWS, SharedPass};
 pub use slots::{Branches, Slots};

@@ -6,6 +6,7 @@ use super::network::FlowNet;
 use super::shared::Part;
 use super::slots::{Branches, CHUNK, GAZE, NO_GAZE, Slots, UNCONDITIONAL};
 use crate::config::CleanHistory;
+use crate::error::Result;
 use crate::frame::Sampler;
 use crate::kernels::{Exec, KvDtype};
 
@@ -83,30 +84,51 @@ fn eighths() -> Vec<f32> {
     (0..8).map(|i| i as f32 / 8.0).collect()
 }
 
+/// Flow times of the reference network's slots for `sampler` and the midpoint rules: each slot's, as the history and the new token have it.
+pub fn reference_times(sampler: Sampler, clean_history: Option<CleanHistory>) -> Vec<f32> {
+    visited(sampler).into_iter().flat_map(|t| [clean_history.map_or(t, |c| c.time(t)), t]).collect()
+}
+
+/// The same of the student's, which sees its history at `tau_history`.
+pub fn student_times(tau_history: f32) -> Vec<f32> {
+    vec![tau_history, 0.0]
+}
+
+/// The eighths, and what `sampler` visits besides.
+fn visited(sampler: Sampler) -> Vec<f32> {
+    let mut taus = eighths();
+    if let Sampler::Euler(steps) = sampler {
+        taus.extend((0..steps).map(|i| f32::from(i) / f32::from(steps)).filter(|t| !eighths().contains(t)));
+    }
+    taus
+}
+
 impl Generator {
     /// Takes all memory.
     ///
+    /// # Errors
+    /// As [`FlowNet::modulation`].
+    ///
     /// # Panics
     /// Without any network.
-    pub fn new(exec: &mut Exec, nets: Nets<'_>, condition: &Condition, options: GeneratorOptions) -> Self {
-        let mut taus = eighths();
-        if let Sampler::Euler(steps) = options.sampler {
-            taus.extend((0..steps).map(|i| f32::from(i) / f32::from(steps)).filter(|t| !eighths().contains(t)));
-        }
-        let pairs: Vec<_> = taus.iter().map(|t| (options.clean_history.map_or(*t, |c| c.time(*t)), *t)).collect();
+    pub fn new(exec: &mut Exec, nets: Nets<'_>, condition: &Condition, options: GeneratorOptions) -> Result<Self> {
+        let GeneratorOptions { sampler, dtype, clean_history } = options;
         let any = nets.any();
         let (latent, window) = (any.latent(), any.config().window_blocks);
-        let dtype = options.dtype;
-        Self {
+        let mut slots = |net, times: &[f32], branches| Slots::new(exec, net, times, branches, dtype);
+        let reference = |net| slots(net, &reference_times(sampler, clean_history), Branches::Guided);
+        let reference = nets.reference.map(reference).transpose()?;
+        let student = nets.student.map(|(net, tau)| slots(net, &student_times(tau), Branches::Baked)).transpose()?;
+        Ok(Self {
             history: History::new(window + CHUNK as usize + 1, latent, condition.layout()),
-            reference: nets.reference.map(|net| Slots::new(exec, net, &pairs, Branches::Guided, dtype)),
-            student: nets.student.map(|(net, tau)| Slots::new(exec, net, &[(tau, 0.0)], Branches::Baked, dtype)),
-            taus,
-            making: (options.sampler, Guidance { weight: 1.0, gaze: 0.0 }),
+            reference,
+            student,
+            taus: visited(sampler),
+            making: (sampler, Guidance { weight: 1.0, gaze: 0.0 }),
             z: vec![0.0; latent],
             start: vec![0.0; latent],
             x1: vec![0.0; latent],
-        }
+        })
     }
 
     /// Whether `sampler` can be used with the slots and networks at hand.

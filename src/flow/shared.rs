@@ -4,7 +4,8 @@
 
 use super::Condition;
 use super::history::History;
-use super::network::{FlowNet, Modulation};
+use super::modulation::Modulation;
+use super::network::FlowNet;
 use super::sampler::{Generator, Guidance, Nets};
 use super::slots::Slots;
 use crate::frame::Sampler;

@@ -6,7 +6,9 @@
 //! token is finished, overwrites them.
 
 use super::history::History;
-use super::network::{FlowNet, Modulation};
+use super::modulation::Modulation;
+use super::network::FlowNet;
+use crate::error::Result;
 use crate::kernels::{Epilogue, Exec, KvCache, KvDtype};
 use crate::nn::{Phases, Rows, Scratch};
 use std::ops::Range;
@@ -77,18 +79,22 @@ pub struct Slots {
 }
 
 impl Slots {
-    /// Slots for pairs `(history, new token)` of flow times.
-    pub fn new(exec: &mut Exec, net: &FlowNet, taus: &[(f32, f32)], branches: Branches, dtype: KvDtype) -> Self {
+    /// Slots for flow times, in turns those of the history and of the new token.
+    ///
+    /// # Errors
+    /// As [`FlowNet::modulation`].
+    pub fn new(exec: &mut Exec, net: &FlowNet, taus: &[f32], branches: Branches, dtype: KvDtype) -> Result<Self> {
         let c = net.config();
         let (d, latent, window) = (c.width, net.latent(), c.window_blocks as u64);
         let rows = (CHUNK as usize + 1) * branches.count();
         let capacity = window + CHUNK;
-        let all: Vec<f32> = taus.iter().flat_map(|(h, n)| [*h, *n]).collect();
-        Self {
+        let slots: Vec<_> =
+            taus.iter().step_by(2).map(|tau| Slot { tau_history: *tau, committed: 0, start: 0 }).collect();
+        Ok(Self {
             branches,
-            slots: taus.iter().map(|(h, _)| Slot { tau_history: *h, committed: 0, start: 0 }).collect(),
-            modulation: Arc::new(net.modulation(exec, &all)),
-            cache: KvCache::new(taus.len() * branches.count() * c.layers, capacity as usize, c.heads, d, dtype),
+            modulation: net.modulation(exec, taus)?,
+            cache: KvCache::new(slots.len() * branches.count() * c.layers, capacity as usize, c.heads, d, dtype),
+            slots,
             gaze: false,
             layers: c.layers,
             window,
@@ -105,7 +111,7 @@ impl Slots {
             x: vec![0.0; rows * d],
             tail: vec![0.0; branches.count() * d],
             x1: vec![0.0; branches.count() * latent],
-        }
+        })
     }
 
     /// Forgets all tokens; the next one has the index `next`.

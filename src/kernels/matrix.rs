@@ -51,7 +51,7 @@ impl Matrix {
                 assert_eq!(q.len(), rows * cols, "pack: rows * cols values");
                 let geo = matmul_i8dx_i8cx::Geometry::new(cols, kernels.i8.run.layout);
                 let mut buffer = Buffer::new(panels * geo.panel);
-                each_panel(buffer.of_mut::<u8>(), geo.panel, &|p, panel| {
+                each_panel(buffer.of_mut::<u8>(), geo.panel, |p, panel| {
                     geo.pack(&q[p * NR * cols..rows.min((p + 1) * NR) * cols], cols, panel);
                 });
                 Body::I8(buffer, geo, pad(scale), kernels.i8)
@@ -106,26 +106,13 @@ impl std::fmt::Debug for Matrix {
     }
 }
 
-/// Bytes from which on a second thread helps with packing.
-const LARGE: usize = 1 << 20;
-
-/// Calls `pack` with the number and the memory of each panel of `size` values.
-fn each_panel<T: Send>(values: &mut [T], size: usize, pack: &(dyn Fn(usize, &mut [T]) + Sync)) {
-    let panels = values.len() / size;
-    let some = |first: usize, values: &mut [T]| {
-        values.chunks_exact_mut(size).enumerate().for_each(|(p, panel)| pack(first + p, panel));
-    };
-    if size_of_val(values) < LARGE {
-        return some(0, values);
-    }
-    let (front, back) = values.split_at_mut(panels / 2 * size);
-    std::thread::scope(|scope| {
-        scope.spawn(|| some(0, front));
-        some(panels / 2, back);
-    });
+/// Calls `pack` with the number and the memory of each panel of `size` values. One thread does it: nobody has said how many there may be when an
+/// engine is made, and memory is the limit.
+fn each_panel<T>(values: &mut [T], size: usize, pack: impl Fn(usize, &mut [T])) {
+    values.chunks_exact_mut(size).enumerate().for_each(|(p, panel)| pack(p, panel));
 }
 
-fn pack_floats<T: super::packed::Plain + Send + Sync>(
+fn pack_floats<T: super::packed::Plain>(
     w: &[T],
     rows: usize,
     cols: usize,
@@ -134,7 +121,7 @@ fn pack_floats<T: super::packed::Plain + Send + Sync>(
 ) -> Buffer {
     assert_eq!(w.len(), rows * cols, "pack: rows * cols values");
     let mut buffer = Buffer::new(panels * geo.panel * size_of::<T>());
-    each_panel(buffer.of_mut::<T>(), geo.panel, &|p, panel| {
+    each_panel(buffer.of_mut::<T>(), geo.panel, |p, panel| {
         for (lane, row) in w[p * NR * cols..rows.min((p + 1) * NR) * cols].chunks_exact(cols).enumerate() {
             for (part, segment) in row.chunks(geo.seg).zip(panel.chunks_exact_mut(geo.seg_stride)) {
                 part.iter().zip(segment.chunks_exact_mut(NR)).for_each(|(v, column)| column[lane] = *v);
@@ -150,7 +137,7 @@ fn pack_nibbles(q: &[u8], scale: &[f16], rows: usize, cols: usize, panels: usize
     assert_eq!(q.len(), rows * stride, "pack: rows * ceil(cols / 2) bytes");
     assert_eq!(scale.len(), rows * geo.groups, "pack: rows * ceil(cols / 32) scales");
     let mut buffer = Buffer::new(panels * geo.panel);
-    each_panel(buffer.of_mut::<u8>(), geo.panel, &|p, panel| {
+    each_panel(buffer.of_mut::<u8>(), geo.panel, |p, panel| {
         matmul_i8dx_i4g::Geometry::pack(&q[p * NR * stride..rows.min((p + 1) * NR) * stride], cols, panel);
     });
     let scales = buffer.of_mut::<f16>();

@@ -20,6 +20,7 @@
 //! | `rope` | rotary positions | queries and keys |
 //! | `attend` | attention over rings of cached keys and values, softmax included | flow, autoencoder |
 //! | `gelu` | GELU and SiLU by themselves | embedding of the flow time |
+//! | `fold` (one file) | a product of float matrices in f64 | two layers that become one when a bundle is loaded |
 //! | `polar` | nearest rotations of 3x3 matrices | all joints of a frame |
 //!
 //! To read one, open `matmul_i8dx_i8cx/mod.rs`, then its `scalar.rs`, one variant, `tests.rs`; the others follow. `cargo test --lib kernels::OPERATION` tests one,
@@ -51,7 +52,9 @@ mod epilogue;
 mod exec;
 #[cfg(test)]
 mod exec_tests;
+mod fold;
 mod gelu;
+mod interleave;
 mod level;
 mod linear;
 mod math;
@@ -75,6 +78,7 @@ pub use exec::{Exec, Limits, RowTable};
 pub use level::Level;
 pub use linear::Epilogue;
 pub use matrix::Matrix;
+pub(crate) use weights::signed;
 pub use weights::{I4_GROUP, Scheme, WeightData, Weights};
 
 use crate::error::{Error, ErrorKind, Result};

@@ -32,9 +32,12 @@ pub(crate) struct Buffer {
 
 enum Store {
     Lines(Vec<Line>),
-    /// A mapping, and where in it the buffer begins: at a multiple of [`HUGE`].
+    /// A mapping, and where in it the buffer begins: large ones at a multiple of [`HUGE`].
     Pages(MmapMut, usize),
 }
+
+/// Smallest buffer in pages of its own, bytes. Weights that live long do not lie between what loading took and gave back, so an allocator can return that.
+const OWN_PAGES: usize = 1 << 16;
 
 impl Buffer {
     /// At least `bytes` zero bytes.
@@ -44,11 +47,14 @@ impl Buffer {
         Self { store, bytes }
     }
 
-    /// Large buffers in huge pages, as far as they fill them; the system may decline, which costs speed alone.
+    /// Buffers in pages of their own: huge ones, as far as they fill them; the system may decline, which costs speed alone.
     fn pages(bytes: usize) -> Option<Store> {
         // Elsewhere a mapping has nothing over the allocator.
-        if bytes < HUGE || cfg!(not(target_os = "linux")) {
+        if bytes < OWN_PAGES || cfg!(not(target_os = "linux")) {
             return None;
+        }
+        if bytes < HUGE {
+            return Some(Store::Pages(MmapMut::map_anon(bytes).ok()?, 0));
         }
         let map = MmapMut::map_anon(bytes + HUGE).ok()?;
         let from = map.as_ptr().align_offset(HUGE);
@@ -164,7 +170,7 @@ mod tests {
 
     #[test]
     fn buffers_are_zeroed_and_aligned() {
-        for bytes in [0, 1, 64, 1000, HUGE - 64, HUGE, 3 * HUGE + 100] {
+        for bytes in [0, 1, 64, 1000, OWN_PAGES - 64, OWN_PAGES, HUGE - 64, HUGE, 3 * HUGE + 100] {
             let mut buffer = Buffer::new(bytes);
             assert!(buffer.bytes() >= bytes && buffer.bytes() < bytes + 64, "{buffer:?}");
             assert!(buffer.of::<u8>().iter().all(|&b| b == 0));

@@ -77,6 +77,12 @@ pub enum WeightData<'a> {
     },
 }
 
+/// The same bytes as int8 values.
+pub(crate) fn signed(bytes: &[u8]) -> &[i8] {
+    // SAFETY: u8 and i8 are of one size and alignment, and every byte is a value of both.
+    unsafe { std::slice::from_raw_parts(bytes.as_ptr().cast(), bytes.len()) }
+}
+
 impl Weights<'_> {
     /// The scheme of the values.
     pub fn scheme(&self) -> Scheme {
@@ -115,7 +121,13 @@ impl Weights<'_> {
         match self.data {
             WeightData::F32(w) => w.to_vec(),
             WeightData::F16(w) => w.iter().map(|v| v.to_f32()).collect(),
-            WeightData::I8 { q, scale } => q.iter().enumerate().map(|(i, &v)| f32::from(v) * scale[i / cols]).collect(),
+            WeightData::I8 { q, scale } => {
+                let mut values = Vec::with_capacity(q.len());
+                for (row, scale) in q.chunks_exact(cols).zip(scale) {
+                    values.extend(row.iter().map(|&v| f32::from(v) * scale));
+                }
+                values
+            }
             WeightData::I4 { q, scale } => (0..self.rows * cols)
                 .map(|i| {
                     let (row, col) = (i / cols, i % cols);

@@ -43,7 +43,7 @@ impl<'e> Walker<'e> {
         exec.listen(activations);
         let condition = Condition::absent(engine.layout());
         let options = GeneratorOptions { sampler, dtype: KvDtype::F16, clean_history: c.session.clean_history };
-        let generator = Generator::new(&mut exec, engine.nets(), &condition, options);
+        let generator = Generator::new(&mut exec, engine.nets(), &condition, options)?;
         let mut this = Self {
             generator,
             sampler,

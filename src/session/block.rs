@@ -53,11 +53,12 @@ impl BlockState {
         };
         let condition = Condition::absent(engine.layout());
         exec.begin();
-        let mut generator = Generator::new(exec, engine.nets(), &condition, generator_options);
+        let generator = Generator::new(exec, engine.nets(), &condition, generator_options);
+        exec.end();
+        let mut generator = generator?;
         if options.gaze_control.guides(options.gaze) {
             generator.open_gaze();
         }
-        exec.end();
         let rig = &engine.config.rig;
         let mut motion = pose::Decoder::new(engine.kernels, rig, engine.config.pose.radius);
         if options.bridge && engine.config.session.bridge > 0.0 {

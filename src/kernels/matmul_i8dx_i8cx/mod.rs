@@ -7,7 +7,7 @@
 
 use super::packed::{NR, Tile};
 use super::quantize_rows::GROUP;
-use super::{Level, Variant};
+use super::{Level, Variant, interleave};
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -72,8 +72,18 @@ impl Geometry {
             panel.fill(flip);
         }
         let swapped = |k: usize| if self.layout == Layout::QuadsPaired { [0, 2, 1, 3][k] } else { k };
+        let done = match self.layout {
+            _ if q.len() < NR * cols => 0,
+            Layout::Quads => interleave::quads(q, cols, panel, |words| words),
+            Layout::QuadsOffset => interleave::quads(q, cols, panel, |words| words ^ 0x8080_8080_8080_8080),
+            Layout::QuadsPaired => interleave::quads(q, cols, panel, |words| {
+                let [a, b, c, d, e, f, g, h] = words.to_le_bytes();
+                u64::from_le_bytes([a, c, b, d, e, g, f, h])
+            }),
+            Layout::Octets => interleave::octets(q, cols, panel),
+        };
         for (lane, row) in q.chunks_exact(cols).enumerate() {
-            for (from, to) in row.chunks(width).zip(panel.chunks_exact_mut(NR * width)) {
+            for (from, to) in row[done..].chunks(width).zip(panel[NR * done..].chunks_exact_mut(NR * width)) {
                 let to = &mut to[lane * width..][..width];
                 if let (Ok(from), Ok(to)) = (<[i8; 4]>::try_from(from), <&mut [u8; 4]>::try_from(&mut *to)) {
                     *to = std::array::from_fn(|k| from[swapped(k)] as u8 ^ flip);

@@ -1,4 +1,4 @@
-use super::{Geometry, Job, VARIANTS};
+use super::{Geometry, Job, Layout, VARIANTS};
 use crate::kernels::packed::{Buffer, NR, TILE_COLS, Tile};
 use crate::kernels::quantize_rows::GROUP;
 use crate::kernels::testing::{Random, available};
@@ -47,6 +47,22 @@ fn compare(random: &mut Random, rows: usize, cols: usize, w: &[i8], x: impl Fn(&
                 let want = naive(q, stride, w, cols, r, first * NR + c);
                 assert_eq!(got, want, "{} {rows} x {cols}, {panels} panels at ({r},{c})", v.name);
             }
+        }
+    }
+}
+
+#[test]
+fn every_layout_has_a_place_for_every_weight() {
+    let mut random = Random(77);
+    for layout in [Layout::Quads, Layout::QuadsOffset, Layout::QuadsPaired, Layout::Octets] {
+        for (rows, cols) in [(16, 1), (16, 16), (16, 47), (16, 64), (16, 200), (5, 64), (13, 33)] {
+            let (geo, w) = (Geometry::new(cols, layout), random.bytes(rows * cols));
+            let mut expected = vec![geo.encode(0); geo.panel];
+            w.iter().enumerate().for_each(|(i, w)| expected[geo.at(i / cols, i % cols)] = geo.encode(*w));
+            let mut packed = vec![7; geo.panel];
+            geo.pack(&w, cols, &mut packed);
+            let n = NR * geo.padded;
+            assert_eq!(packed[..n], expected[..n], "{layout:?} {rows} x {cols}");
         }
     }
 }
