@@ -6,7 +6,7 @@ mod cli;
 mod common;
 
 use common::{Inputs, golden_path, motion_of, tiny_f32, tiny_in};
-use visavis::bundle::{BundleFile, Contents};
+use visavis::bundle::{BundleFile, Contents, int16_activations};
 use visavis::engine::Engine;
 use visavis::error::ErrorKind;
 use visavis::frame::Sampler;
@@ -95,6 +95,41 @@ fn sessions_have_the_same_bits_on_every_level_and_with_two_threads() {
         for level in levels {
             assert!(run(level, 2) == first, "{scheme} at {level}");
         }
+    }
+}
+
+/// The networks' transformer layers, where the time goes, take int8; every name that the rule speaks of is that of a layer.
+#[test]
+fn int16_activations_are_those_of_named_layers() {
+    let contents = Contents::of(&tiny_f32()).unwrap();
+    let names: Vec<_> = contents.tensors.iter().filter_map(|t| t.name.strip_suffix(".weight")).collect();
+    let (wide, narrow): (Vec<&str>, Vec<&str>) = names.iter().partition(|name| int16_activations(name));
+    for name in ["flow.final.out", "student.final.mod", "flow.tau.0", "flow.layers.0.mod", "vae.decoder.latent"] {
+        assert!(wide.contains(&name), "{name} of {wide:?}");
+    }
+    for name in ["vae.decoder.layers.0.fc2", "vae.decoder.out", "vae.encoder.frame", "vae.encoder.mu"] {
+        assert!(wide.contains(&name), "{name} of {wide:?}");
+    }
+    for part in ["qkv", "proj", "fc1", "fc2"] {
+        for network in ["flow", "student", "vae.encoder"] {
+            let name = format!("{network}.layers.0.{part}");
+            assert!(narrow.contains(&name.as_str()), "{name} of {narrow:?}");
+        }
+    }
+}
+
+/// The last layers of flow and decoder, whose errors nothing evens out, are int8 in int4 bundles.
+#[test]
+fn last_layers_are_no_int4() {
+    let schemes = quantise(&tiny_f32(), &options(Scheme::I4, &[])).unwrap().schemes;
+    for (name, scheme) in [
+        ("flow.final.out", Scheme::I8),
+        ("student.final.out", Scheme::I8),
+        ("vae.decoder.out", Scheme::I8),
+        ("vae.decoder.layers.0.fc2", Scheme::I4),
+        ("flow.layers.0.fc2", Scheme::I4),
+    ] {
+        assert_eq!(schemes[name], scheme, "{name}");
     }
 }
 

@@ -64,6 +64,7 @@ fn a_quick_report_tells_everything() {
     let row = |name: &str| tensors.iter().find(|t| t["name"] == name).unwrap();
     let (run, unread) = (row("flow.layers.0.qkv"), row("vae.encoder.logvar"));
     assert!(run["sqnr_db"].as_f64().unwrap() > 20.0 && run["output"]["cosine"].as_f64().unwrap() > 0.99, "{run}");
+    assert_eq!((&run["activation_bits"], &row("vae.decoder.out")["activation_bits"]), (&8.into(), &16.into()));
     assert!(unread["output"].is_null(), "a layer that no block runs has no outputs: {unread}");
     assert_eq!(json["speed"].as_array().unwrap().len(), 2);
 

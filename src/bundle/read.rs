@@ -2,6 +2,7 @@
 
 use super::file::invalid;
 use super::rewrite::{entries, floats as bytes_of};
+use super::stored::pack;
 use super::tensors::Tensors;
 use super::{StoredData, StoredWeights, drawn};
 use crate::error::{Error, ErrorKind, Result};
@@ -101,7 +102,7 @@ impl<'a> Tensors<'a> {
     pub fn linear(&self, kernels: Kernels, name: &str, outputs: usize, inputs: &[usize]) -> Result<Matrix> {
         let values = self.values(name, outputs, inputs)?;
         let bias = self.f32(&format!("{name}.bias"), &[outputs])?;
-        let matrix = kernels.pack(values.borrow(outputs, inputs.iter().product()), Some(&bias)).named(name);
+        let matrix = pack(kernels, values.borrow(outputs, inputs.iter().product()), name, Some(&bias));
         if let (Values::I8 { q, .. } | Values::I4 { q, .. }, Some(file)) = (values, self.file) {
             file.release(q);
         }

@@ -21,6 +21,10 @@ const CASES: [Case; 7] = [
     Case { rows: 37, cols: 96, out: 70 },
 ];
 
+/// Weights, and whether activations are int16 instead of int8.
+const SCHEMES: [(&str, bool); 6] =
+    [("f32", false), ("f16", false), ("i8", false), ("i8", true), ("i4", false), ("i4", true)];
+
 /// A layer in one scheme, with the values that its weights stand for.
 struct Layer {
     f32: Vec<f32>,
@@ -78,11 +82,16 @@ fn linear_matches_f64_and_has_the_same_bits_everywhere() {
         let gates = random.floats(3 * (out + 7), 1.0);
         let index: Vec<u32> = (0..rows).map(|_| random.below(3) as u32).collect();
         let gate = RowTable { table: &gates, stride: out + 7, offset: 7, index: &index };
-        for scheme in ["f32", "f16", "i8", "i4"] {
+        for (scheme, split) in SCHEMES {
             for e in [Epilogue::Store, Epilogue::Gelu, Epilogue::Add, Epilogue::GatedAdd(gate)] {
                 let mut first: Option<Vec<u32>> = None;
                 for kernels in levels() {
-                    let m = kernels.pack(Weights { rows: out, cols, data: layer.data(scheme) }, Some(&bias));
+                    let mut m = kernels.pack(Weights { rows: out, cols, data: layer.data(scheme) }, Some(&bias));
+                    if split {
+                        m = m.with_int16_activations();
+                    }
+                    let bits_of_x = scheme.starts_with('i').then_some(if split { 16 } else { 8 });
+                    assert_eq!(m.activation_bits(), bits_of_x);
                     assert_eq!(
                         (m.out_features(), m.in_features(), m.scheme().to_string().as_str()),
                         (out, cols, scheme)
@@ -94,8 +103,8 @@ fn linear_matches_f64_and_has_the_same_bits_everywhere() {
                         exec.linear(&m, &x, rows, &mut y, e);
                         exec.end();
                         let first = first.get_or_insert_with(|| bits(&y));
-                        assert_eq!(*first, bits(&y), "{scheme} {rows}x{cols}x{out} {exec:?}");
-                        check(&layer, scheme, &x, (rows, cols, out), &bias, &y0, e, &y);
+                        assert_eq!(*first, bits(&y), "{scheme} {split} {rows}x{cols}x{out} {exec:?}");
+                        check(&layer, (scheme, split), &x, (rows, cols, out), &bias, &y0, e, &y);
                     }
                 }
             }
@@ -106,7 +115,7 @@ fn linear_matches_f64_and_has_the_same_bits_everywhere() {
 #[allow(clippy::too_many_arguments, reason = "operands of one product")]
 fn check(
     layer: &Layer,
-    scheme: &str,
+    (scheme, split): (&str, bool),
     x: &[f32],
     (rows, cols, out): (usize, usize, usize),
     bias: &[f32],
@@ -122,8 +131,11 @@ fn check(
             for k in 0..cols {
                 let w = layer.value(scheme, cols, c, k);
                 sum += f64::from(x[k]) * w;
+                size += w.abs();
                 // Quantised activations are off by half a step each.
-                size += if scheme.starts_with('i') { 1e5 * w.abs() * f64::from(top) / 127.0 } else { w.abs() };
+                if scheme.starts_with('i') {
+                    size += 1e5 * w.abs() * f64::from(top) / if split { 32258.0 } else { 127.0 };
+                }
             }
             let at = r * out + c;
             let want = match e {
@@ -152,10 +164,12 @@ fn extreme_scales_have_the_same_bits_everywhere() {
         let sizes = [0.0, 1e-40, 1e-30, 1.0, 1e30, 3e38];
         let x: Vec<f32> =
             std::iter::once(0.0).chain(x[1..].iter().enumerate().map(|(i, v)| v * sizes[i / cols])).collect();
-        for data in [WeightData::I8 { q: &q, scale: &scale }, WeightData::I4 { q: &nibbles, scale: &group_scale }] {
+        let data = [WeightData::I8 { q: &q, scale: &scale }, WeightData::I4 { q: &nibbles, scale: &group_scale }];
+        for (data, split) in data.into_iter().flat_map(|data| [(data, false), (data, true)]) {
             let mut first: Option<Vec<u32>> = None;
             for kernels in levels() {
                 let m = kernels.pack(Weights { rows: out, cols, data }, None);
+                let m = if split { m.with_int16_activations() } else { m };
                 let mut exec = Exec::new(kernels, 1, Limits { rows: 6, width: cols }).unwrap();
                 let mut y = vec![0.5; 6 * out];
                 exec.linear(&m, &x[1..], 6, &mut y, Epilogue::Store);

@@ -30,14 +30,15 @@ impl Exec {
         if let Some(activations) = &mut self.activations {
             activations.listen(&w.name, x, w.cols);
         }
-        for start in (0..rows).step_by(MAX_ROWS) {
-            let n = MAX_ROWS.min(rows - start);
+        let most = if w.split { MAX_ROWS / 2 } else { MAX_ROWS };
+        for start in (0..rows).step_by(most) {
+            let n = most.min(rows - start);
             let x = &x[start * w.cols..][..n * w.cols];
             self.portion(w, x, start, n, &mut y[start * w.out..][..n * w.out], e);
         }
     }
 
-    /// At most 16 rows; `start` is the first one's number in gate tables.
+    /// At most 16 rows, 8 of those that are split; `start` is the first one's number in gate tables.
     fn portion(&mut self, w: &Matrix, x: &[f32], start: usize, rows: usize, y: &mut [f32], e: Epilogue<'_>) {
         let Self { kernels, pool, x: padded, q, wide, sums, .. } = self;
         let y = Shared(y.as_mut_ptr());
@@ -90,10 +91,10 @@ impl Exec {
                 });
             }
             Body::I8(buffer, geo, scale, variant) => {
-                let stride = geo.padded + LINE;
-                let n = rows * stride;
-                let (q, sums) = (&mut q.of_mut::<i8>()[..n], &mut sums[..rows * geo.padded / GROUP]);
-                let x_scale = quantize(kernels, pool, x, w.cols, geo.padded, q, sums);
+                let (stride, rows_of_q) = (geo.padded + LINE, if w.split { 2 * rows } else { rows });
+                let n = rows_of_q * stride;
+                let (q, sums) = (&mut q.of_mut::<i8>()[..n], &mut sums[..rows_of_q * geo.padded / GROUP]);
+                let x_scale = quantize(kernels, pool, w, x, geo.padded, q, sums);
                 let wide = &mut wide.of_mut::<i16>()[..if variant.run.wide { n } else { 0 }];
                 for (wide, q) in wide.iter_mut().zip(&*q) {
                     *wide = i16::from(*q);
@@ -103,28 +104,43 @@ impl Exec {
                     let (first, panels) = span(t);
                     let mut tile: Tile<i32> = [[0; TILE_COLS]; MAX_ROWS];
                     let next = step(t, next, geo.panel);
-                    let geo = *geo;
+                    let (geo, rows_of_x, rows) = (*geo, rows, rows_of_q);
                     let job = matmul_i8dx_i8cx::Job { q, wide, sums, stride, rows, weights, geo, first, panels, next };
                     // SAFETY: a matrix holds a variant that this CPU can run.
                     unsafe { (variant.run.run)(&job, &mut tile) };
-                    (0..rows).for_each(|r| finish(t, r, Sums::I32(&tile[r], x_scale[r], &scale[t * TILE_COLS..])));
+                    let scale = &scale[t * TILE_COLS..];
+                    for (r, &x_scale) in x_scale[..rows_of_x].iter().enumerate() {
+                        let sums = if w.split {
+                            Sums::I32Pair([&tile[2 * r], &tile[2 * r + 1]], x_scale, scale)
+                        } else {
+                            Sums::I32(&tile[r], x_scale, scale)
+                        };
+                        finish(t, r, sums);
+                    }
                 });
             }
             Body::I4(buffer, geo, variant) => {
-                let stride = geo.padded() + LINE;
-                let (q, sums) = (&mut q.of_mut::<i8>()[..rows * stride], &mut sums[..rows * geo.groups]);
-                let x_scale = quantize(kernels, pool, x, w.cols, geo.padded(), q, sums);
+                let (stride, rows_of_q) = (geo.padded() + LINE, if w.split { 2 * rows } else { rows });
+                let (q, sums) = (&mut q.of_mut::<i8>()[..rows_of_q * stride], &mut sums[..rows_of_q * geo.groups]);
+                let x_scale = quantize(kernels, pool, w, x, geo.padded(), q, sums);
                 let (q, sums) = (&*q, &*sums);
                 let (weights, scales) = (buffer.of::<u8>(), buffer.of::<half::f16>());
                 pool.run(tiles, &|t, next| {
                     let (first, panels) = span(t);
                     let mut tile: Tile<f32> = [[0.0; TILE_COLS]; MAX_ROWS];
                     let next = step(t, next, geo.panel);
-                    let geo = *geo;
+                    let (geo, rows_of_x, rows) = (*geo, rows, rows_of_q);
                     let job = matmul_i8dx_i4g::Job { q, sums, stride, rows, weights, scales, geo, first, panels, next };
                     // SAFETY: a matrix holds a variant that this CPU can run.
                     unsafe { (variant.run)(&job, &mut tile) };
-                    (0..rows).for_each(|r| finish(t, r, Sums::Scaled(&tile[r], x_scale[r])));
+                    for (r, &x_scale) in x_scale[..rows_of_x].iter().enumerate() {
+                        let sums = if w.split {
+                            Sums::ScaledPair([&tile[2 * r], &tile[2 * r + 1]], x_scale)
+                        } else {
+                            Sums::Scaled(&tile[r], x_scale)
+                        };
+                        finish(t, r, sums);
+                    }
                 });
             }
         }
@@ -149,12 +165,12 @@ fn spread<'a>(x: &'a [f32], rows: usize, cols: usize, padded: usize, scratch: &'
     (scratch, stride)
 }
 
-/// Quantises each row of `x` into rows of `q` that are `padded` and a line apart; returns the rows' scales.
+/// Quantises each row of `x` into a row of `q`, or two where `w` has rows split, that are `padded` and a line apart; returns the rows' scales.
 fn quantize(
     kernels: &Kernels,
     pool: &mut Pool,
+    w: &Matrix,
     x: &[f32],
-    cols: usize,
     padded: usize,
     q: &mut [i8],
     sums: &mut [i32],
@@ -162,11 +178,21 @@ fn quantize(
     let mut scales = [0.0; MAX_ROWS];
     let (stride, groups) = (padded + LINE, padded / GROUP);
     let (q, sums, scale) = (Shared(q.as_mut_ptr()), Shared(sums.as_mut_ptr()), Shared(scales.as_mut_ptr()));
-    by_rows(pool, x.len() / cols, x.len(), &|r| {
-        // SAFETY: q has a padded row a stride, sums its groups and scales an element for each row of x; a row is one piece.
-        let (q, sums, scale) = unsafe { (q.part(r * stride, padded), sums.part(r * groups, groups), scale.part(r, 1)) };
-        // SAFETY: a `Kernels` exists only for a level that this CPU has.
-        scale[0] = unsafe { (kernels.quantize.run)(&x[r * cols..][..cols], q, sums) };
+    by_rows(pool, x.len() / w.cols, x.len(), &|r| {
+        let x = &x[r * w.cols..][..w.cols];
+        // SAFETY: q has a padded row a stride, or two of them, sums their groups and scales an element for each row of x; a row is one piece.
+        let row = |r: usize| unsafe { (q.part(r * stride, padded), sums.part(r * groups, groups)) };
+        // SAFETY: as above.
+        let scale = unsafe { scale.part(r, 1) };
+        if w.split {
+            let ((high, high_sums), (low, low_sums)) = (row(2 * r), row(2 * r + 1));
+            // SAFETY: a `Kernels` exists only for a level that this CPU has.
+            scale[0] = unsafe { (kernels.split.run)(x, [high, low], [high_sums, low_sums]) };
+        } else {
+            let (q, sums) = row(r);
+            // SAFETY: a `Kernels` exists only for a level that this CPU has.
+            scale[0] = unsafe { (kernels.quantize.run)(x, q, sums) };
+        }
     });
     scales
 }

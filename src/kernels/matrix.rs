@@ -15,6 +15,8 @@ pub struct Matrix {
     /// Padded with zeros to whole panels, as are the scales.
     pub(super) bias: Vec<f32>,
     pub(super) body: Body,
+    /// Whether integer weights are multiplied with int16 activations: rows are split in two.
+    pub(super) split: bool,
 }
 
 /// Packed weights with the variant they are packed for; the variant came from a [`Kernels`], hence runs on this CPU.
@@ -60,7 +62,7 @@ impl Matrix {
                 Body::I4(pack_nibbles(q, scale, rows, cols, panels), matmul_i8dx_i4g::Geometry::new(cols), kernels.i4)
             }
         };
-        Matrix { name: String::new(), out: rows, cols, bias, body }
+        Matrix { name: String::new(), out: rows, cols, bias, body, split: false }
     }
 
     /// The same matrix with a name for [`Activations`](super::Activations).
@@ -68,6 +70,22 @@ impl Matrix {
     pub fn named(mut self, name: &str) -> Self {
         name.clone_into(&mut self.name);
         self
+    }
+
+    /// The same matrix for int16 activations instead of int8 (W8A16, W4A16), where its weights are integers: twice the multiplications, the
+    /// same bytes, 1/254 of the activations' rounding. Float weights take floats as they come either way.
+    #[must_use]
+    pub fn with_int16_activations(mut self) -> Self {
+        self.split = matches!(self.body, Body::I8(..) | Body::I4(..));
+        self
+    }
+
+    /// Bits that activations are rounded to: 8 or 16; `None` for float weights, which take floats.
+    pub fn activation_bits(&self) -> Option<u8> {
+        match self.body {
+            Body::F32(..) | Body::F16(..) => None,
+            Body::I8(..) | Body::I4(..) => Some(if self.split { 16 } else { 8 }),
+        }
     }
 
     /// Length of a row of results.

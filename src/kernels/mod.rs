@@ -15,6 +15,7 @@
 //! | `matmul_i8dx_i8cx` | the same of int8 rows (`i8dx`: quantised per row as they come) and int8 weights (`i8cx`: a scale a channel) | nearly all weights of int8 bundles |
 //! | `matmul_i8dx_i4g` | the same with int4 weights, a scale for a group of 32 columns | nearly all weights of int4 bundles |
 //! | `quantize_rows` | rows of activations to int8 | both of those |
+//! | `split_rows` | rows of activations to int16, as two rows of int8 | both, for layers whose activations int8 is too coarse for |
 //! | `epilogue` | what follows a product: scales, bias, then store, GELU, or addition to the residual stream, gated or not | every product |
 //! | `norm` | layer normalisation with AdaLN's shift and scale | flow, autoencoder |
 //! | `rope` | rotary positions | queries and keys |
@@ -68,6 +69,7 @@ mod packed;
 mod polar;
 mod quantize_rows;
 mod rope;
+mod split_rows;
 #[cfg(test)]
 mod testing;
 mod weights;
@@ -106,6 +108,7 @@ pub struct Kernels {
     i8: &'static Variant<matmul_i8dx_i8cx::Kernel>,
     i4: &'static Variant<matmul_i8dx_i4g::Run>,
     quantize: &'static Variant<quantize_rows::Run>,
+    split: &'static Variant<split_rows::Run>,
     epilogue: &'static Variant<epilogue::Run>,
     attend: &'static Variant<attend::Kernel>,
     norm: &'static Variant<norm::Run>,
@@ -146,6 +149,7 @@ impl Kernels {
             i8: pick(matmul_i8dx_i8cx::VARIANTS, level),
             i4: pick(matmul_i8dx_i4g::VARIANTS, level),
             quantize: pick(quantize_rows::VARIANTS, level),
+            split: pick(split_rows::VARIANTS, level),
             epilogue: pick(epilogue::VARIANTS, level),
             attend: pick(attend::VARIANTS, level),
             norm: pick(norm::VARIANTS, level),
@@ -173,6 +177,7 @@ impl Kernels {
             ("matmul_i8dx_i8cx", self.i8.name),
             ("matmul_i8dx_i4g", self.i4.name),
             ("quantize_rows", self.quantize.name),
+            ("split_rows", self.split.name),
             ("epilogue", self.epilogue.name),
             ("attend", self.attend.name),
             ("norm", self.norm.name),

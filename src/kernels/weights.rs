@@ -13,9 +13,9 @@ pub const I4_GROUP: usize = GROUP;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scheme {
-    /// Group-wise int4, int8 activations.
+    /// Group-wise int4, int8 activations (int16: [`Matrix::with_int16_activations`](super::Matrix::with_int16_activations)).
     I4,
-    /// Per-channel int8, int8 activations.
+    /// Per-channel int8, int8 or int16 activations.
     I8,
     /// Half floats, float activations and sums.
     F16,

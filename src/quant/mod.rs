@@ -13,7 +13,8 @@
 //! | `write` | putting the bundle together |
 //!
 //! Weights are quantised one layer at a time: int8 symmetric per output channel, int4 symmetric in groups of 32 columns with an f16
-//! scale. Activations are quantised when they come, per row, so nothing about them is stored. In int8 and int4 bundles biases, norms,
+//! scale. Activations are quantised when they come, per row, to int8 or, where
+//! [`int16_activations`](crate::bundle::int16_activations) says so, int16; nothing about them is stored. In int8 and int4 bundles biases, norms,
 //! embeddings of tokens and statistics stay as they are; in f16 bundles all but the statistics and the decoder's are f16 as well. The frames of the idle clip, a
 //! fiftieth of an int4 bundle, give way to their latents, which are all that an engine wants of them. The result depends on the input bundle and the options
 //! alone, bit for bit.

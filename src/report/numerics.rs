@@ -1,10 +1,10 @@
 //! Numbers that depend on the bundles alone, not on the machine: tensors, layer outputs, teacher-forced blocks.
 
 use super::spread::{Spread, cosine, sqnr};
-use crate::bundle::BundleFile;
+use crate::bundle::{BundleFile, StoredWeights};
 use crate::engine::Engine;
 use crate::error::Result;
-use crate::kernels::{Activations, Epilogue, Exec, Kernels, Limits, Scheme};
+use crate::kernels::{Activations, Epilogue, Exec, Kernels, Limits, Matrix, Scheme};
 use crate::quant::{Forced, Layer, Scene, Teacher, layers};
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +20,8 @@ pub struct TensorRow {
     pub name: String,
     /// Its scheme.
     pub scheme: Scheme,
+    /// Bits that its activations are rounded to; none where they are floats.
+    pub activation_bits: Option<u8>,
     /// Outputs and inputs.
     pub shape: [usize; 2],
     /// Bytes of values and scales in the file.
@@ -156,14 +158,16 @@ fn tensors(candidate: &Loaded, layers: &[Layer], activations: &Activations) -> R
         let (a, b) = (layer.weights.to_f32(), stored.to_f32());
         let x = activations.rows(&layer.name);
         let rows = x.len() / stored.cols;
+        let pack = |w: &StoredWeights| w.pack(kernels, &layer.name, None);
+        let matrix = pack(&stored);
         let output = (rows > 0).then(|| {
-            let run = |w: &crate::bundle::StoredWeights| product(kernels, w, x, rows);
-            let (a, b) = (run(&layer.weights), run(&stored));
+            let (a, b) = (product(&pack(&layer.weights), kernels, x, rows), product(&matrix, kernels, x, rows));
             LayerOutput { rows, cosine: cosine(&a, &b), sqnr_db: sqnr(&a, &b) }
         });
         Ok(TensorRow {
             name: layer.name.clone(),
             scheme: stored.scheme(),
+            activation_bits: matrix.activation_bits(),
             shape: [stored.rows, stored.cols],
             bytes: stored.borrow().bytes(),
             sqnr_db: sqnr(&a, &b),
@@ -175,11 +179,11 @@ fn tensors(candidate: &Loaded, layers: &[Layer], activations: &Activations) -> R
 }
 
 /// xW' of `rows` rows, without bias.
-fn product(kernels: Kernels, w: &crate::bundle::StoredWeights, x: &[f32], rows: usize) -> Vec<f32> {
-    let mut y = vec![0.0; rows * w.rows];
+fn product(w: &Matrix, kernels: Kernels, x: &[f32], rows: usize) -> Vec<f32> {
+    let mut y = vec![0.0; rows * w.out_features()];
     // One thread needs nothing from the system, so this does not fail.
-    if let Ok(mut exec) = Exec::new(kernels, 1, Limits { rows, width: w.cols }) {
-        exec.linear(&kernels.pack(w.borrow(), None), x, rows, &mut y, Epilogue::Store);
+    if let Ok(mut exec) = Exec::new(kernels, 1, Limits { rows, width: w.in_features() }) {
+        exec.linear(w, x, rows, &mut y, Epilogue::Store);
     }
     y
 }

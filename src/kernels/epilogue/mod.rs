@@ -2,6 +2,8 @@
 //!
 //! For each column c: t = sum\[c\] (i32 sums: converted, times `x_scale * w_scale[c]`; f32 sums: times `x_scale`), t += bias\[c\],
 //! then y\[c\] = t, gelu(t), y\[c\] + t, or fma(gate\[c\], t, y\[c\]).
+//!
+//! Rows that were [split](super::split_rows) have two sums, and `254 high[c] + low[c]`, both as floats, stands for `sum[c]`.
 
 use super::{Level, Variant};
 
@@ -22,6 +24,10 @@ pub(crate) enum Sums<'a> {
     Scaled(&'a [f32], f32),
     /// Integer sums, the row's scale, and the scale of each column.
     I32(&'a [i32], f32, &'a [f32]),
+    /// As `Scaled`, of a split row: the high sums and the low ones.
+    ScaledPair([&'a [f32]; 2], f32),
+    /// As `I32`, of a split row.
+    I32Pair([&'a [i32]; 2], f32, &'a [f32]),
 }
 
 /// What to do with each finished value.

@@ -3,6 +3,7 @@
 use super::{Finish, Sums};
 use crate::kernels::math::gelu;
 use crate::kernels::packed::TILE_COLS;
+use crate::kernels::split_rows::BASE;
 
 pub(super) fn run(sums: Sums<'_>, bias: &[f32], finish: Finish<'_>, y: &mut [f32]) {
     body(sums, bias, finish, y);
@@ -24,6 +25,16 @@ pub(super) fn body(sums: Sums<'_>, bias: &[f32], finish: Finish<'_>, y: &mut [f3
         Sums::I32(sums, x_scale, w_scale) => {
             for ((t, sum), w) in t.iter_mut().zip(&sums[..n]).zip(&w_scale[..n]) {
                 *t = *sum as f32 * (x_scale * w);
+            }
+        }
+        Sums::ScaledPair([high, low], x_scale) => {
+            for ((t, high), low) in t.iter_mut().zip(&high[..n]).zip(&low[..n]) {
+                *t = (BASE * high + low) * x_scale;
+            }
+        }
+        Sums::I32Pair([high, low], x_scale, w_scale) => {
+            for (((t, high), low), w) in t.iter_mut().zip(&high[..n]).zip(&low[..n]).zip(&w_scale[..n]) {
+                *t = (BASE * *high as f32 + *low as f32) * (x_scale * w);
             }
         }
     }

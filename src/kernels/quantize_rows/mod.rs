@@ -13,6 +13,8 @@ mod avx512;
 mod neon;
 mod scalar;
 
+pub(super) use scalar::{MAGIC, largest, scalable};
+
 /// Columns whose values are summed together, for weights with an offset; also the group of int4 weights.
 pub(crate) const GROUP: usize = 32;
 

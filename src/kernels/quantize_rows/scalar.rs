@@ -10,12 +10,11 @@ pub(super) fn run(x: &[f32], q: &mut [i8], sums: &mut [i32]) -> f32 {
 pub(super) const TINY: f32 = 1e-30;
 
 /// Rounds to nearest even: the low byte of x + MAGIC is the integer, for |x| < 2^22.
-pub(super) const MAGIC: f32 = 12_582_912.0;
+pub(in crate::kernels) const MAGIC: f32 = 12_582_912.0;
 
-/// Magnitudes are compared as integers: exact, and a NaN is larger than everything.
+/// The largest magnitude. They are compared as integers: exact, and a NaN is larger than everything.
 #[inline(always)]
-pub(super) fn body(x: &[f32], q: &mut [i8], sums: &mut [i32]) -> f32 {
-    assert!(q.len() >= x.len() && q.len() == sums.len() * GROUP, "q is padded to whole groups");
+pub(in crate::kernels) fn largest(x: &[f32]) -> f32 {
     let mut top = [0u32; 16];
     let (head, tail) = x.as_chunks::<16>();
     for chunk in head {
@@ -26,12 +25,30 @@ pub(super) fn body(x: &[f32], q: &mut [i8], sums: &mut [i32]) -> f32 {
     for (t, v) in top.iter_mut().zip(tail) {
         *t = (*t).max(v.to_bits() & 0x7fff_ffff);
     }
-    let top = f32::from_bits(top.into_iter().fold(0, u32::max));
-    if !(TINY..f32::INFINITY).contains(&top) {
-        q.fill(0);
-        sums.fill(0);
-        return if top < TINY { 0.0 } else { f32::NAN };
+    f32::from_bits(top.into_iter().fold(0, u32::max))
+}
+
+/// A largest magnitude that a row can be scaled by; else the scale of the row of zeros that stands for it.
+#[inline(always)]
+pub(in crate::kernels) fn scalable(top: f32) -> Result<f32, f32> {
+    match top {
+        t if (TINY..f32::INFINITY).contains(&t) => Ok(t),
+        t if t < TINY => Err(0.0),
+        _ => Err(f32::NAN),
     }
+}
+
+#[inline(always)]
+pub(super) fn body(x: &[f32], q: &mut [i8], sums: &mut [i32]) -> f32 {
+    assert!(q.len() >= x.len() && q.len() == sums.len() * GROUP, "q is padded to whole groups");
+    let top = match scalable(largest(x)) {
+        Ok(top) => top,
+        Err(scale) => {
+            q.fill(0);
+            sums.fill(0);
+            return scale;
+        }
+    };
     let inverse = 127.0 / top;
     for (q, x) in q.iter_mut().zip(x) {
         *q = (x * inverse + MAGIC).to_bits() as u8 as i8;

@@ -179,6 +179,7 @@ fn tensors(report: &Report, d: &mut Document) {
             vec![
                 t.name.clone(),
                 t.scheme.to_string(),
+                t.activation_bits.map_or_else(|| "float".to_owned(), |bits| format!("int{bits}")),
                 format!("{} x {}", t.shape[0], t.shape[1]),
                 t.bytes.to_string(),
                 db(t.sqnr_db),
@@ -187,7 +188,8 @@ fn tensors(report: &Report, d: &mut Document) {
                 t.output.map_or_else(|| "-".into(), |o| db(o.sqnr_db)),
             ]
         });
-        let head = ["layer", "scheme", "shape", "bytes", "weights dB", "max error", "output cosine", "output dB"];
+        let head =
+            ["layer", "weights", "inputs", "shape", "bytes", "weights dB", "max error", "output cosine", "output dB"];
         d.table(&head, rows.collect());
     }
 }

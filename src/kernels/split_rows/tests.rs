@@ -1,0 +1,71 @@
+use super::{BASE, VARIANTS};
+use crate::kernels::quantize_rows::GROUP;
+use crate::kernels::testing::{Random, available};
+
+type Rows = (u32, [Vec<i8>; 2], [Vec<i32>; 2]);
+
+fn run(v: &crate::kernels::Variant<super::Run>, x: &[f32]) -> Rows {
+    let padded = x.len().next_multiple_of(GROUP);
+    let (mut q, mut sums) = ([(); 2].map(|()| vec![99; padded]), [(); 2].map(|()| vec![99; padded / GROUP]));
+    let (rows, groups) = (q.each_mut().map(Vec::as_mut_slice), sums.each_mut().map(Vec::as_mut_slice));
+    // SAFETY: `available` yields only what this CPU can run.
+    let scale = unsafe { (v.run)(x, rows, groups) };
+    (if scale.is_nan() { u32::MAX } else { scale.to_bits() }, q, sums)
+}
+
+/// The integer that both rows make of value `i`.
+fn joined(q: &[Vec<i8>; 2], i: usize) -> i32 {
+    BASE as i32 * i32::from(q[0][i]) + i32::from(q[1][i])
+}
+
+#[test]
+fn variants_have_the_bits_of_the_reference() {
+    let mut random = Random(53);
+    for n in (0..140).chain([1024, 4096]) {
+        for size in [1e-38f32, 1e-31, 1e-29, 1.0, 3e38] {
+            let mut x = random.floats(n + 1, size);
+            if n > 0 && random.below(4) == 0 {
+                x[1 + random.below(n)] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0][random.below(4)];
+            }
+            let want = run(&VARIANTS[0], &x[1..]);
+            for v in available(VARIANTS) {
+                assert_eq!(run(v, &x[1..]), want, "{} {n} {size}", v.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn values_come_back_within_half_a_step() {
+    let mut random = Random(54);
+    for v in available(VARIANTS) {
+        let x = random.floats(100, 5.0);
+        let (scale, q, sums) = run(v, &x);
+        let scale = f32::from_bits(scale);
+        for (i, x) in x.iter().enumerate() {
+            // A float keeps 24 bits of the 16 that are asked for: the rest is the test's own rounding.
+            let back = joined(&q, i) as f32 * scale;
+            assert!((x - back).abs() <= 0.51 * scale, "{}: {x} as {back} in steps of {scale}", v.name);
+        }
+        assert_eq!(
+            (0..100).map(|i| joined(&q, i).abs()).max(),
+            Some(254 * 127),
+            "the largest value uses the whole range"
+        );
+        for (q, sums) in q.iter().zip(&sums) {
+            assert!(q.iter().all(|&q| q >= -127), "the products take nothing below -127");
+            assert_eq!(sums.iter().sum::<i32>(), q.iter().map(|&q| i32::from(q)).sum::<i32>());
+            assert!(q[100..].iter().all(|&q| q == 0), "padding is zero");
+        }
+    }
+}
+
+#[test]
+fn every_integer_comes_back() {
+    let x: Vec<f32> = (-32258..=32258).map(|v| v as f32).collect();
+    for v in available(VARIANTS) {
+        let (scale, q, _) = run(v, &x);
+        assert_eq!(f32::from_bits(scale), 1.0, "{}", v.name);
+        assert!((0..x.len()).all(|i| joined(&q, i) == i as i32 - 32258), "{}", v.name);
+    }
+}
