@@ -128,7 +128,10 @@ impl<'a> BundleFile<'a> {
 
     /// Lets go of the pages of `part`, a part of these bytes that has been read: if the file is mapped they leave this process's memory, and
     /// reading them again would bring them back.
-    #[cfg_attr(target_os = "android", allow(unused_variables, clippy::unused_self, reason = "nothing is mapped there"))]
+    #[cfg_attr(
+        any(not(unix), target_os = "android"),
+        allow(unused_variables, clippy::unused_self, reason = "nothing is mapped there")
+    )]
     pub(super) fn release(&self, part: &[u8]) {
         #[cfg(all(unix, not(target_os = "android")))]
         if let (Bytes::Mapped(map), RELEASED..) = (&self.bytes, part.len()) {

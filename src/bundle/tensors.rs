@@ -101,7 +101,7 @@ impl<'a> Tensors<'a> {
     /// Fails if the bundle holds, or its config records, tensors that nothing has read.
     ///
     /// # Errors
-    /// [`ErrorKind::BundleInvalid`] naming the first of them.
+    /// [`ErrorKind::BundleInvalid`](crate::error::ErrorKind::BundleInvalid) naming the first of them.
     pub fn finish(&self) -> Result<()> {
         let read = self.read.borrow();
         let recorded = self.quantisation.iter().flat_map(|q| q.tensors.keys().map(String::as_str));
