@@ -8,9 +8,10 @@
 //!   integration of the root are part of it.
 //! - *Within a period* a key is turned by its own angle and then rounded to f16, so that motion at hour 24 cannot have the bits of hour 0,
 //!   nor can motion that starts one token later. Generated motion feeds on itself and amplifies the last bit without end (as
-//!   Lorenz 1963), so free-running sessions cannot be compared. One block on the same history can: what 24 hours change in it must be no
-//!   more than what a few tokens change. The largest of the some 40,000 distances is told, not judged: it is where the model is most
-//!   sensitive to its keys, and as large a few tokens later.
+//!   Lorenz 1963), so free-running sessions cannot be compared. One block on the same history can: what it changes by in the two hours
+//!   after a day must be no more than what it changes by in the first two. Both are taken over a whole turn of the slowest phase: a few
+//!   tokens hardly turn the slow ones, so that their keys keep their rounding, and neighbouring places share theirs. The largest of
+//!   the distances is told, not judged: it is where the model is most sensitive to its keys, and as large in the first hours.
 
 use super::Voices;
 use crate::engine::Engine;
@@ -26,8 +27,10 @@ use std::sync::Arc;
 const DAY: u64 = 24 * 3600 * FPS as u64 / BLOCK_FRAMES as u64;
 /// Blocks that are compared to the bit; re-anchored every eight.
 const BLOCKS: usize = 40;
-/// Places within the first half minute, and after the day, that single blocks are made at.
-const PLACES: [u64; 8] = [1, 2, 3, 5, 21, 55, 144, 233];
+/// Places within the first two hours, and after the day, that single blocks are made at, and the blocks between them: together
+/// 48,352 tokens, in which the slowest phase of a head of 64 channels turns once (47,117 tokens). A prime, so that no phase turns evenly.
+const PLACES: u64 = 32;
+const APART: u64 = 1511;
 /// Noises of such a block.
 const NOISES: u64 = 8;
 
@@ -38,9 +41,10 @@ pub struct Hours {
     pub period_blocks: u64,
     /// Frames in which a session that starts a period later differs in any bit.
     pub period_frames_that_differ: usize,
-    /// Distance between joints of one block at the session's start and some tokens later: root mean square and largest, metres.
-    pub tokens_later: [f64; 2],
-    /// The same 24 hours later.
+    /// Distance between joints of one block at the session's start and within the two hours after it: root mean square and largest,
+    /// metres.
+    pub hours_later: [f64; 2],
+    /// The same within the two hours after a day.
     pub day_later: [f64; 2],
 }
 
@@ -61,8 +65,8 @@ impl Hours {
         let first = single_blocks(engine, voices, sampler, 0)?;
         let from = |start: u64| -> Result<[f64; 2]> {
             let (mut square, mut most, mut count) = (0.0, 0.0, 0);
-            for place in PLACES {
-                let other = single_blocks(engine, voices, sampler, start + place)?;
+            for place in 1..=PLACES {
+                let other = single_blocks(engine, voices, sampler, start + APART * place)?;
                 let joints = first.iter().zip(&other).flat_map(|(a, b)| a.global.iter().zip(&b.global));
                 for (a, b) in joints {
                     let apart = f64::from(a.position.distance(b.position));
@@ -71,8 +75,8 @@ impl Hours {
             }
             Ok([libm::sqrt(square / f64::from(count)), most])
         };
-        let (tokens_later, day_later) = (from(0)?, from(DAY)?);
-        Ok(Self { period_blocks: PERIOD, period_frames_that_differ, tokens_later, day_later })
+        let (hours_later, day_later) = (from(0)?, from(DAY)?);
+        Ok(Self { period_blocks: PERIOD, period_frames_that_differ, hours_later, day_later })
     }
 }
 

@@ -18,7 +18,7 @@ const SUPPORT: f64 = 0.02;
 pub(super) const SWITCH_SEAM: f64 = 1.2;
 /// Distance by which a day of token indices may move joints of one block, root mean square, metres.
 const PRECISION: f64 = 0.005;
-/// How often what a few tokens change a day may change; means of eight places under eight noises differ by a tenth by chance.
+/// How often what the first hours change a day may change; means of 32 places under eight noises differ by a tenth by chance.
 const DAY: f64 = 1.5;
 
 /// One thing that was judged.
@@ -147,15 +147,15 @@ pub(super) fn report(soak: &Soak, measured: Measured) -> Report {
         hours.period_blocks as f64 * BLOCK_FRAMES as f64 / f64::from(FPS) / 86_400.0
     );
     judge("period", hours.period_frames_that_differ == 0, detail);
-    let ([day, day_most], [tokens, tokens_most]) = (hours.day_later, hours.tokens_later);
+    let ([day, day_most], [first, first_most]) = (hours.day_later, hours.hours_later);
     let detail = format!(
-        "a block a day later moves by {:.3} mm (most {:.2}), some tokens later by {:.3} mm (most {:.2})",
+        "a block moves by {:.3} mm (most {:.2}) in the hours after a day, by {:.3} mm (most {:.2}) in the first hours",
         1000.0 * day,
         1000.0 * day_most,
-        1000.0 * tokens,
-        1000.0 * tokens_most
+        1000.0 * first,
+        1000.0 * first_most
     );
-    judge("precision", day <= DAY * tokens && day <= PRECISION, detail);
+    judge("precision", day <= DAY * first && day <= PRECISION, detail);
     if let Some(seam) = switches {
         judge("switches", seam <= SWITCH_SEAM, format!("seam metric {seam:.2} where the sampler changes"));
     }

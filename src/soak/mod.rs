@@ -10,7 +10,7 @@
 //! | allocations | computing a block allocates nothing after the first cycle's tenth (where the caller can count) |
 //! | each metric (soaks of four cycles and more) | the mean over the last half of the cycles within 15 % of that over the first half, plus two standard errors of their difference, told from the spread within the halves (`drift`); the supporting foot's speed within 15 % of 2 cm/s where it is lower |
 //! | period | the same noise and inputs 2^24 blocks (26 days) later give the same motion, bit for bit, over 40 blocks |
-//! | precision | a day later the joints of one block on the same history are off by no more (root mean square: 1.5 times, and 5 mm) than some tokens later |
+//! | precision | in the hours after a day the joints of one block on the same history move by no more (root mean square: 1.5 times, and 5 mm) than in the first hours |
 //! | switches | where a governor's steps change the sampler the seam metric is at most 1.2 ([`crate::metrics::switch_seam`]) |
 //! | guard | the motion is not defective ([`crate::pose::GuardStats::is_defective`]) |
 //!

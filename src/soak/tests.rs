@@ -22,7 +22,7 @@ fn a_short_soak_measures_everything() {
     assert!(told.len() > 60 && told.windows(2).all(|w| w[0] < w[1]));
     assert!(report.cycles.iter().all(|w| w.all().iter().all(|(_, v)| v.is_some_and(f64::is_finite))), "{report:?}");
     let hours = report.hours_apart;
-    assert!(hours.period_frames_that_differ == 0 && hours.tokens_later[0] > 0.0, "{hours:?}");
+    assert!(hours.period_frames_that_differ == 0 && hours.hours_later[0] > 0.0, "{hours:?}");
     let passed = |name: &str| report.verdicts.iter().any(|v| v.name == name && v.passed);
     assert!(passed("period") && passed("precision"), "{hours:?}");
     let names: Vec<_> = report.verdicts.iter().map(|v| v.name.as_str()).collect();
@@ -60,7 +60,7 @@ fn drift_growth_and_allocations_fail() {
         support_foot_speed: Some(support),
         ..Figures::default()
     };
-    let fine = Hours { tokens_later: [1e-5, 1e-4], day_later: [1.4e-5, 2e-2], ..Hours::default() };
+    let fine = Hours { hours_later: [1e-5, 1e-4], day_later: [1.4e-5, 2e-2], ..Hours::default() };
     let with = |last: Figures, allocations: u64, hours: Hours| {
         let first = figures(0.5, 0.001);
         let measured = judge::Measured {
@@ -82,7 +82,7 @@ fn drift_growth_and_allocations_fail() {
     assert!(!passed(figures(0.5, 0.001), 1), "an allocation");
     let hours = |hours: Hours| with(figures(0.5, 0.001), 0, hours);
     let centimetre = [0.01, 0.02];
-    assert!(!hours(Hours { day_later: centimetre, tokens_later: centimetre, ..fine }), "a centimetre after a day");
+    assert!(!hours(Hours { day_later: centimetre, hours_later: centimetre, ..fine }), "a centimetre after a day");
     assert!(!hours(Hours { day_later: [1.6e-5, 2e-2], ..fine }), "a day changes more than a token");
     assert!(!hours(Hours { period_frames_that_differ: 1, ..fine }), "a bit after a period");
 }
