@@ -1,12 +1,13 @@
 //! Ten minutes without a break, and a user who leaves and comes back.
 
+use super::figures::mean;
 use super::motion::generate;
 use super::parallel::each;
 use super::window::{LEAD, Window};
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::frame::{FPS, FRAME_SAMPLES, Frame, Root};
-use crate::metrics::Summary;
+use crate::metrics::{Summary, mean_and_error2};
 use crate::pose::GuardStats;
 use crate::recording::Recording;
 use crate::session::SessionOptions;
@@ -14,8 +15,10 @@ use glam::Vec3;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// Sessions that are averaged.
-const RUNS: usize = 4;
+/// Sessions that are averaged: single minutes differ by a third in how far feet slide, so few of them tell nothing.
+const RUNS: usize = 16;
+/// Users who walk away and come back.
+const WALKS: usize = 4;
 /// The gaze target of a long run: free gaze changes its level by chance every few seconds, which would pass for drift.
 const GAZE: f32 = 0.8;
 
@@ -52,6 +55,8 @@ pub struct Change {
     pub first: f64,
     /// In the last one.
     pub last: f64,
+    /// Standard error of their difference, from how the runs differ; `None` of one run.
+    pub error: Option<f64>,
     /// A difference up to this counts as none: a part of nearly nothing says nothing.
     pub least: f64,
 }
@@ -93,7 +98,7 @@ impl Endurance {
         let (period, periods, runs) = if quick { (20, 3, 1) } else { (60, 10, RUNS) };
         let length = period * FPS as usize;
         let results = each(threads, runs, &|_| {}, &|run| {
-            let voices = voices(windows, run, length).map(|voice| Some(voice.repeat(periods)));
+            let voices = voices(windows, [run, runs], length).map(|voice| Some(voice.repeat(periods)));
             let user: Vec<Vec3> = (0..length * periods).map(|i| circling(i % length, length)).collect();
             let options =
                 SessionOptions { start: Root::default(), seed: run as u64, gaze: Some(GAZE), ..options.clone() };
@@ -105,9 +110,11 @@ impl Endurance {
         let guard = GuardStats { trips, held_frames: held, ..GuardStats::default() };
         let frames = runs * periods * length;
         let metric = |(name, value, least): &Metric| {
-            let mean =
-                |pick: fn(&Run) -> &Summary| super::figures::mean(results.iter().filter_map(|run| value(pick(run))));
-            Some(Change { metric: name, first: mean(|r| &r.first)?, last: mean(|r| &r.last)?, least: *least })
+            let pairs: Vec<_> = results.iter().filter_map(|r| Some((value(&r.first)?, value(&r.last)?))).collect();
+            let differences: Vec<_> = pairs.iter().map(|(first, last)| last - first).collect();
+            let error = (pairs.len() > 1).then(|| libm::sqrt(mean_and_error2(&differences).1));
+            let (first, last) = (mean(pairs.iter().map(|p| p.0))?, mean(pairs.iter().map(|p| p.1))?);
+            Some(Change { metric: name, first, last, error, least: *least })
         };
         Ok(Self {
             period,
@@ -159,10 +166,10 @@ impl Run {
     }
 }
 
-/// Both voices of windows one after the other until `frames` frames are full, beginning with another window in each run.
-fn voices(windows: &[Window], run: usize, frames: usize) -> [Vec<f32>; 2] {
+/// Both voices of windows one after the other until `frames` frames are full, beginning with another window in each of `runs` runs.
+fn voices(windows: &[Window], [run, runs]: [usize; 2], frames: usize) -> [Vec<f32>; 2] {
     let mut voices = [Vec::new(), Vec::new()];
-    let mut order = windows.iter().cycle().skip(run * windows.len() / RUNS);
+    let mut order = windows.iter().cycle().skip(run * windows.len() / runs);
     while voices[0].len() < frames * FRAME_SAMPLES {
         let Some(window) = order.next() else { break };
         let length = window.truth.frames.len() * FRAME_SAMPLES;
@@ -207,11 +214,11 @@ impl Follow {
         threads: usize,
         quick: bool,
     ) -> Result<Self> {
-        let runs = if quick { 1 } else { RUNS };
+        let runs = if quick { 1 } else { WALKS };
         let seconds = |s: f32| (s * FPS as f32) as usize;
         let (there, end) = (seconds(STAND + WALK + WAIT), seconds(STAND + 2.0 * (WALK + WAIT)));
         let results = each(threads, runs, &|_| {}, &|run| {
-            let voices = voices(windows, run, end).map(Some);
+            let voices = voices(windows, [run, runs], end).map(Some);
             let user: Vec<Vec3> = (0..end).map(|i| walking(i as f32 / FPS as f32)).collect();
             let options = SessionOptions { start: Root::default(), seed: run as u64, ..options.clone() };
             let recording = generate(engine, options, voices, user.iter().copied())?.recording;
@@ -225,7 +232,7 @@ impl Follow {
             runs,
             away: results.iter().map(|r| r.0).fold(0.0, f64::max),
             back: results.iter().map(|r| r.1).fold(0.0, f64::max),
-            head_angle: super::figures::mean(results.iter().filter_map(|r| r.2)),
+            head_angle: mean(results.iter().filter_map(|r| r.2)),
         })
     }
 }

@@ -135,7 +135,9 @@ impl Report {
         }
         if let Some(e) = &self.endurance {
             for c in &e.changes {
-                let text = format!("{:.4} to {:.4} ({:+.0} %)", c.first, c.last, 100.0 * (c.last / c.first - 1.0));
+                let part = |v: f64| 100.0 * v / c.first;
+                let error = c.error.map_or(String::new(), |e| format!(", standard error {:.0} %", part(e)));
+                let text = format!("{:.4} to {:.4} ({:+.0} %{error})", c.first, c.last, part(c.last - c.first));
                 row(&format!("endurance, {}", c.metric), text);
             }
             let text = format!("{} runs of {} x {} s, {:.1} m from the start", e.runs, e.periods, e.period, e.wandered);
