@@ -42,6 +42,7 @@ impl Exec {
     fn portion(&mut self, w: &Matrix, x: &[f32], start: usize, rows: usize, y: &mut [f32], e: Epilogue<'_>) {
         let Self { kernels, pool, x: padded, q, wide, sums, .. } = self;
         let y = Shared(y.as_mut_ptr());
+        let rows_of_q = if w.split { 2 * rows } else { rows };
         let panels = w.out.div_ceil(NR);
         let tiles = panels.div_ceil(MAX_PANELS);
         // Finishes one row of one tile; `sums` starts at the tile's first column.
@@ -91,10 +92,10 @@ impl Exec {
                 });
             }
             Body::I8(buffer, geo, scale, variant) => {
-                let (stride, rows_of_q) = (geo.padded + LINE, if w.split { 2 * rows } else { rows });
+                let stride = geo.padded + LINE;
                 let n = rows_of_q * stride;
                 let (q, sums) = (&mut q.of_mut::<i8>()[..n], &mut sums[..rows_of_q * geo.padded / GROUP]);
-                let x_scale = quantize(kernels, pool, w, x, geo.padded, q, sums);
+                let x_scale = &quantize(kernels, pool, w, x, geo.padded, q, sums)[..rows];
                 let wide = &mut wide.of_mut::<i16>()[..if variant.run.wide { n } else { 0 }];
                 for (wide, q) in wide.iter_mut().zip(&*q) {
                     *wide = i16::from(*q);
@@ -104,12 +105,12 @@ impl Exec {
                     let (first, panels) = span(t);
                     let mut tile: Tile<i32> = [[0; TILE_COLS]; MAX_ROWS];
                     let next = step(t, next, geo.panel);
-                    let (geo, rows_of_x, rows) = (*geo, rows, rows_of_q);
+                    let (geo, rows) = (*geo, rows_of_q);
                     let job = matmul_i8dx_i8cx::Job { q, wide, sums, stride, rows, weights, geo, first, panels, next };
                     // SAFETY: a matrix holds a variant that this CPU can run.
                     unsafe { (variant.run.run)(&job, &mut tile) };
                     let scale = &scale[t * TILE_COLS..];
-                    for (r, &x_scale) in x_scale[..rows_of_x].iter().enumerate() {
+                    for (r, &x_scale) in x_scale.iter().enumerate() {
                         let sums = if w.split {
                             Sums::I32Pair([&tile[2 * r], &tile[2 * r + 1]], x_scale, scale)
                         } else {
@@ -120,20 +121,20 @@ impl Exec {
                 });
             }
             Body::I4(buffer, geo, variant) => {
-                let (stride, rows_of_q) = (geo.padded() + LINE, if w.split { 2 * rows } else { rows });
+                let stride = geo.padded() + LINE;
                 let (q, sums) = (&mut q.of_mut::<i8>()[..rows_of_q * stride], &mut sums[..rows_of_q * geo.groups]);
-                let x_scale = quantize(kernels, pool, w, x, geo.padded(), q, sums);
+                let x_scale = &quantize(kernels, pool, w, x, geo.padded(), q, sums)[..rows];
                 let (q, sums) = (&*q, &*sums);
                 let (weights, scales) = (buffer.of::<u8>(), buffer.of::<half::f16>());
                 pool.run(tiles, &|t, next| {
                     let (first, panels) = span(t);
                     let mut tile: Tile<f32> = [[0.0; TILE_COLS]; MAX_ROWS];
                     let next = step(t, next, geo.panel);
-                    let (geo, rows_of_x, rows) = (*geo, rows, rows_of_q);
+                    let (geo, rows) = (*geo, rows_of_q);
                     let job = matmul_i8dx_i4g::Job { q, sums, stride, rows, weights, scales, geo, first, panels, next };
                     // SAFETY: a matrix holds a variant that this CPU can run.
                     unsafe { (variant.run)(&job, &mut tile) };
-                    for (r, &x_scale) in x_scale[..rows_of_x].iter().enumerate() {
+                    for (r, &x_scale) in x_scale.iter().enumerate() {
                         let sums = if w.split {
                             Sums::ScaledPair([&tile[2 * r], &tile[2 * r + 1]], x_scale)
                         } else {

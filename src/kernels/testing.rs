@@ -53,3 +53,17 @@ pub(crate) fn levels() -> impl Iterator<Item = Kernels> {
 pub(crate) fn bits(v: &[f32]) -> Vec<u32> {
     v.iter().map(|v| v.to_bits()).collect()
 }
+
+/// Calls `check` with rows of all tails and of magnitudes up to a size, which it is told, unaligned; a quarter of them with a value that is not finite, or 0.
+pub(crate) fn for_rows_of_all_sizes(seed: u64, check: impl Fn(&[f32], f32)) {
+    let mut random = Random(seed);
+    for n in (0..140).chain([1024, 4096]) {
+        for size in [1e-38, 1e-31, 1e-29, 1.0, 3e38] {
+            let mut x = random.floats(n + 1, size);
+            if n > 0 && random.below(4) == 0 {
+                x[1 + random.below(n)] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0][random.below(4)];
+            }
+            check(&x[1..], size);
+        }
+    }
+}

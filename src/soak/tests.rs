@@ -83,6 +83,6 @@ fn drift_growth_and_allocations_fail() {
     let hours = |hours: Hours| with(figures(0.5, 0.001), 0, hours);
     let centimetre = [0.01, 0.02];
     assert!(!hours(Hours { day_later: centimetre, hours_later: centimetre, ..fine }), "a centimetre after a day");
-    assert!(!hours(Hours { day_later: [1.6e-5, 2e-2], ..fine }), "a day changes more than a token");
+    assert!(!hours(Hours { day_later: [1.6e-5, 2e-2], ..fine }), "a day changes more than the first hours");
     assert!(!hours(Hours { period_frames_that_differ: 1, ..fine }), "a bit after a period");
 }

@@ -1,5 +1,5 @@
 use super::{GROUP, VARIANTS};
-use crate::kernels::testing::{Random, available};
+use crate::kernels::testing::{Random, available, for_rows_of_all_sizes};
 
 fn run(v: &crate::kernels::Variant<super::Run>, x: &[f32]) -> (u32, Vec<i8>, Vec<i32>) {
     let padded = x.len().next_multiple_of(GROUP);
@@ -11,19 +11,12 @@ fn run(v: &crate::kernels::Variant<super::Run>, x: &[f32]) -> (u32, Vec<i8>, Vec
 
 #[test]
 fn variants_have_the_bits_of_the_reference() {
-    let mut random = Random(51);
-    for n in (0..140).chain([1024, 4096]) {
-        for size in [1e-38f32, 1e-31, 1e-29, 1.0, 3e38] {
-            let mut x = random.floats(n + 1, size);
-            if n > 0 && random.below(4) == 0 {
-                x[1 + random.below(n)] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0][random.below(4)];
-            }
-            let want = run(&VARIANTS[0], &x[1..]);
-            for v in available(VARIANTS) {
-                assert_eq!(run(v, &x[1..]), want, "{} {n} {size}", v.name);
-            }
+    for_rows_of_all_sizes(51, |x, size| {
+        let want = run(&VARIANTS[0], x);
+        for v in available(VARIANTS) {
+            assert_eq!(run(v, x), want, "{} {} {size}", v.name, x.len());
         }
-    }
+    });
 }
 
 #[test]

@@ -1,6 +1,6 @@
 use super::{BASE, VARIANTS};
 use crate::kernels::quantize_rows::GROUP;
-use crate::kernels::testing::{Random, available};
+use crate::kernels::testing::{Random, available, for_rows_of_all_sizes};
 
 type Rows = (u32, [Vec<i8>; 2], [Vec<i32>; 2]);
 
@@ -20,19 +20,12 @@ fn joined(q: &[Vec<i8>; 2], i: usize) -> i32 {
 
 #[test]
 fn variants_have_the_bits_of_the_reference() {
-    let mut random = Random(53);
-    for n in (0..140).chain([1024, 4096]) {
-        for size in [1e-38f32, 1e-31, 1e-29, 1.0, 3e38] {
-            let mut x = random.floats(n + 1, size);
-            if n > 0 && random.below(4) == 0 {
-                x[1 + random.below(n)] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0][random.below(4)];
-            }
-            let want = run(&VARIANTS[0], &x[1..]);
-            for v in available(VARIANTS) {
-                assert_eq!(run(v, &x[1..]), want, "{} {n} {size}", v.name);
-            }
+    for_rows_of_all_sizes(53, |x, size| {
+        let want = run(&VARIANTS[0], x);
+        for v in available(VARIANTS) {
+            assert_eq!(run(v, x), want, "{} {} {size}", v.name, x.len());
         }
-    }
+    });
 }
 
 #[test]
