@@ -1,8 +1,10 @@
 //! [`Exec`]: kernels, threads and scratch of one session; the one object that networks call.
 
+use std::ops::Range;
+
 use super::Kernels;
 use super::activations::Activations;
-use super::attend::{Head, KvCache, Span};
+use super::attend::{Head, KvCache, MAX_GROUP, Row, Span, Store};
 use super::linear::{LINE, by_rows};
 use super::packed::{Buffer, MAX_ROWS};
 use super::quantize_rows::GROUP;
@@ -197,32 +199,39 @@ impl Exec {
                 "attend: span in the cache"
             );
         }
-        let kernels = &self.kernels;
-        let y = Shared(y.as_mut_ptr());
-        // Neighbouring rows often share a ring, so one piece is one head of up to 4 rows: its keys stay in the cache.
-        let groups = rows.div_ceil(4);
-        self.pool.run(groups * heads, &|piece, _| {
-            let (head, group) = (piece % heads, piece / heads);
-            for r in group * 4..rows.min(group * 4 + 4) {
-                let q = &q[r * row_stride + head * head_dim..][..head_dim];
-                // SAFETY: in y, and each row's head is in one piece.
-                let y = unsafe { y.part(r * dim + head * head_dim, head_dim) };
-                let span = spans[r];
+        let (kernels, y) = (&self.kernels, Shared(y.as_mut_ptr()));
+        for start in (0..rows).step_by(MAX_SPANS) {
+            let (groups, n) = groups(&spans[start..rows.min(start + MAX_SPANS)]);
+            // One piece is one head of one group: a group's keys are read once.
+            self.pool.run(n * heads, &|piece, _| {
+                let (head, group) = (piece % heads, &groups[piece / heads]);
+                let first = group.clone().map(|i| spans[start + i].first).min().unwrap_or(0);
+                let mut group = group.clone();
+                let n = group.len();
+                let mut rows: [Row<'_>; MAX_GROUP] = std::array::from_fn(|_| match group.next() {
+                    Some(i) => {
+                        let (r, span) = (start + i, spans[start + i]);
+                        Row {
+                            q: &q[r * row_stride + head * head_dim..][..head_dim],
+                            // SAFETY: in y, and each row's head is in one piece.
+                            y: unsafe { y.part(r * dim + head * head_dim, head_dim) },
+                            slot: cache.slot(span.first),
+                            len: span.len as usize,
+                            shift: (span.first - first) as usize,
+                        }
+                    }
+                    None => Row { q: &[], y: &mut [], slot: 0, len: 0, shift: 0 },
+                });
+                let (rows, ring) = (&mut rows[..n], spans[start + groups[piece / heads].start].ring);
                 // SAFETY: a `Kernels` exists only for a level that this CPU has.
                 unsafe {
                     match &cache.store {
-                        super::attend::Store::F16(k, v) => {
-                            let (k, v) = (k.of(), v.of());
-                            (kernels.attend.run.f16)(&ring(cache, k, v, span, head), q, y);
-                        }
-                        super::attend::Store::F32(k, v) => {
-                            let (k, v) = (k.of(), v.of());
-                            (kernels.attend.run.f32)(&ring(cache, k, v, span, head), q, y);
-                        }
+                        Store::F16(k, v) => (kernels.attend.run.f16)(&seen(cache, k.of(), v.of(), ring, head), rows),
+                        Store::F32(k, v) => (kernels.attend.run.f32)(&seen(cache, k.of(), v.of(), ring, head), rows),
                     }
                 }
-            }
-        });
+            });
+        }
     }
 
     /// GELU, tanh form, in place.
@@ -244,15 +253,31 @@ impl std::fmt::Debug for Exec {
     }
 }
 
-fn ring<'a, T>(cache: &KvCache, k: &'a [T], v: &'a [T], span: Span, head: usize) -> Head<'a, T> {
-    let from = cache.head(span.ring as usize, head);
-    let at = from..from + cache.capacity * cache.head_dim();
-    Head {
-        k: &k[at.clone()],
-        v: &v[at],
-        dim: cache.head_dim(),
-        capacity: cache.capacity,
-        slot: cache.slot(span.first),
-        len: span.len as usize,
+/// Spans that are grouped at a time, without allocating.
+const MAX_SPANS: usize = 64;
+
+/// Spans of one group begin at most this many tokens apart: what only some of its rows see is read for each of them.
+const MAX_SHIFT: u64 = 8;
+
+/// Neighbouring spans of one ring, up to [`MAX_GROUP`], and the number of groups.
+fn groups(spans: &[Span]) -> ([Range<usize>; MAX_SPANS], usize) {
+    let mut groups = [const { 0..0 }; MAX_SPANS];
+    let (mut n, mut start) = (0, 0);
+    for i in 1..=spans.len() {
+        let near = |s: &Span| {
+            s.ring == spans[start].ring && spans[start..i].iter().all(|t| s.first.abs_diff(t.first) <= MAX_SHIFT)
+        };
+        if i == spans.len() || i - start == MAX_GROUP || !near(&spans[i]) {
+            groups[n] = start..i;
+            (n, start) = (n + 1, i);
+        }
     }
+    (groups, n)
+}
+
+/// What `head` sees of a ring.
+fn seen<'a, T>(cache: &KvCache, k: &'a [T], v: &'a [T], ring: u32, head: usize) -> Head<'a, T> {
+    let from = cache.head(ring as usize, head);
+    let at = from..from + cache.capacity * cache.head_dim();
+    Head { k: &k[at.clone()], v: &v[at], dim: cache.head_dim(), capacity: cache.capacity }
 }

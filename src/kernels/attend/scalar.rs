@@ -1,46 +1,46 @@
-//! The reference: one head, chunk by chunk; variants keep its order of sums, and run it for heads that are no multiple of 16 wide.
+//! The reference: one row after the other, chunk by chunk; variants keep its order of sums, and run it for heads that are no multiple of 16 wide.
 
-use super::{CHUNK, Head};
+use super::{CHUNK, Head, Row};
 use crate::kernels::math::{LANES, exp, fold};
 
-pub(super) fn f16(head: &Head<'_, half::f16>, q: &[f32], out: &mut [f32]) {
-    body(head, q, out, half::f16::to_f32_const);
+pub(super) fn f16(head: &Head<'_, half::f16>, rows: &mut [Row<'_>]) {
+    head.check(rows);
+    rows.iter_mut().for_each(|r| row(head, r, half::f16::to_f32_const));
 }
 
-pub(super) fn f32(head: &Head<'_, f32>, q: &[f32], out: &mut [f32]) {
-    body(head, q, out, |v| v);
+pub(super) fn f32(head: &Head<'_, f32>, rows: &mut [Row<'_>]) {
+    head.check(rows);
+    rows.iter_mut().for_each(|r| row(head, r, |v| v));
 }
 
 #[inline(always)]
-pub(super) fn body<T: Copy>(head: &Head<'_, T>, q: &[f32], out: &mut [f32], to_f32: impl Fn(T) -> f32 + Copy) {
-    head.check(q, out);
-    let n = q.len();
+pub(super) fn row<T: Copy>(head: &Head<'_, T>, row: &mut Row<'_>, to_f32: impl Fn(T) -> f32 + Copy) {
+    let n = head.dim;
     let scale = 1.0 / (n as f32).sqrt();
-    out.fill(0.0);
+    row.y.fill(0.0);
     let (mut top, mut total) = (f32::NEG_INFINITY, 0.0f32);
-    for start in (0..head.len).step_by(CHUNK) {
-        let tokens = CHUNK.min(head.len - start);
+    for start in (0..row.len).step_by(CHUNK) {
+        let tokens = CHUNK.min(row.len - start);
         let mut p = [0.0f32; CHUNK];
         for (t, p) in p[..tokens].iter_mut().enumerate() {
-            *p = dot(q, &head.k[head.at(start + t)..][..n], to_f32) * scale;
+            *p = dot(row.q, &head.k[head.at(row, row.shift + start + t)..][..n], to_f32) * scale;
         }
         let (keep, new_top) = soften(&mut p, tokens, top);
-        let sum = fold_chunk(&p);
-        total = total.mul_add(keep, sum);
+        total = total.mul_add(keep, fold_chunk(&p));
         top = new_top;
         if start > 0 {
-            out.iter_mut().for_each(|o| *o *= keep);
+            row.y.iter_mut().for_each(|y| *y *= keep);
         }
         for (t, p) in p[..tokens].iter().enumerate() {
-            let v = &head.v[head.at(start + t)..][..n];
-            for (o, v) in out.iter_mut().zip(v) {
-                *o = p.mul_add(to_f32(*v), *o);
+            let v = &head.v[head.at(row, row.shift + start + t)..][..n];
+            for (y, v) in row.y.iter_mut().zip(v) {
+                *y = p.mul_add(to_f32(*v), *y);
             }
         }
     }
-    if head.len > 0 {
+    if row.len > 0 {
         let inverse = 1.0 / total;
-        out.iter_mut().for_each(|o| *o *= inverse);
+        row.y.iter_mut().for_each(|y| *y *= inverse);
     }
 }
 
@@ -62,7 +62,15 @@ fn dot<T: Copy>(q: &[f32], k: &[T], to_f32: impl Fn(T) -> f32) -> f32 {
 /// Scores to weights relative to the new maximum, zeros past `tokens`; also what weights of the old maximum are to be multiplied by.
 #[inline(always)]
 pub(super) fn soften(p: &mut [f32; CHUNK], tokens: usize, top: f32) -> (f32, f32) {
-    let new_top = p[..tokens].iter().fold(top, |m, &s| if s > m { s } else { m });
+    let larger = |m: f32, s: f32| if s > m { s } else { m };
+    p[tokens..].fill(f32::NEG_INFINITY);
+    let mut tops = [top; LANES];
+    for chunk in p.as_chunks::<LANES>().0 {
+        for (m, &s) in tops.iter_mut().zip(chunk) {
+            *m = larger(*m, s);
+        }
+    }
+    let new_top = tops.into_iter().fold(top, larger);
     for p in p.iter_mut() {
         *p = exp(*p - new_top);
     }

@@ -1,10 +1,27 @@
 use half::f16;
 
-use super::{CHUNK, Head, VARIANTS};
+use super::{CHUNK, Head, Kernel, MAX_GROUP, Row, VARIANTS};
+use crate::kernels::Variant;
 use crate::kernels::testing::{Random, available, bits};
 
+/// What a row sees: slot, length and shift.
+type Seen = (usize, usize, usize);
+
+/// Results of a group with the queries `q`, one after the other, over both storages.
+fn run(variant: &Variant<Kernel>, f32: &Head<'_, f32>, f16: &Head<'_, f16>, q: &[f32], seen: &[Seen]) -> [Vec<u32>; 2] {
+    // Neither queries nor results lie at a multiple of a register's size.
+    let (mut a, mut b) = (vec![5.0; q.len() + 1], vec![5.0; q.len() + 1]);
+    for (half, y) in [(false, &mut a), (true, &mut b)] {
+        let rows = q.chunks_exact(f32.dim).zip(y[1..].chunks_exact_mut(f32.dim)).zip(seen);
+        let mut rows: Vec<_> = rows.map(|((q, y), &(slot, len, shift))| Row { q, y, slot, len, shift }).collect();
+        // SAFETY: `available` yields only what this CPU can run.
+        unsafe { if half { (variant.run.f16)(f16, &mut rows) } else { (variant.run.f32)(f32, &mut rows) } }
+    }
+    [bits(&a), bits(&b)]
+}
+
 #[test]
-fn variants_have_the_bits_of_the_reference() {
+fn variants_have_the_bits_of_the_reference_in_groups_of_all_sizes() {
     let mut random = Random(71);
     for head_dim in (1..40).chain([64, 80, 128, 256, 100]) {
         let (capacity, offset) = (1 + random.below(3 * CHUNK), random.below(4));
@@ -13,25 +30,44 @@ fn variants_have_the_bits_of_the_reference() {
             random.awkward(capacity * head_dim + offset).into_iter().map(|v| v.clamp(-1e3, 1e3)).collect::<Vec<_>>();
         let half = |v: &[f32]| v.iter().map(|&v| f16::from_f32(v)).collect::<Vec<_>>();
         let (k16, v16) = (half(&k), half(&v));
+        let f32 = Head { k: &k[offset..], v: &v[offset..], dim: head_dim, capacity };
+        let f16 = Head { k: &k16[offset..], v: &v16[offset..], dim: head_dim, capacity };
         for len in [0, 1, capacity / 2, capacity] {
             for scale in [1.0, 1e4] {
-                let q = random.floats(head_dim + 1, scale);
+                let n = 1 + random.below(MAX_GROUP);
+                let q = random.floats(n * head_dim + 1, scale);
                 let slot = random.below(capacity);
-                let f32 = Head { k: &k[offset..], v: &v[offset..], dim: head_dim, capacity, slot, len };
-                let f16 = Head { k: &k16[offset..], v: &v16[offset..], dim: head_dim, capacity, slot, len };
-                let run = |variant: &crate::kernels::Variant<super::Kernel>| {
-                    let (mut a, mut b) = (vec![5.0; head_dim + 1], vec![5.0; head_dim + 1]);
-                    // SAFETY: `available` yields only what this CPU can run.
-                    unsafe {
-                        (variant.run.f32)(&f32, &q[1..], &mut a[1..]);
-                        (variant.run.f16)(&f16, &q[1..], &mut b[1..]);
-                    }
-                    (bits(&a), bits(&b))
-                };
-                let want = run(&VARIANTS[0]);
+                // The first rows see the same tokens, the others begin and end elsewhere.
+                let seen: Vec<Seen> = (0..n)
+                    .map(|r| if r < 2 { (0, len) } else { (random.below(9), random.below(capacity + 1)) })
+                    .map(|(shift, len)| ((slot + shift) % capacity, len, shift))
+                    .collect();
+                let want = run(&VARIANTS[0], &f32, &f16, &q[1..], &seen);
                 for variant in available(VARIANTS) {
-                    assert!(run(variant) == want, "{} {head_dim} {len} of {capacity}", variant.name);
+                    let got = run(variant, &f32, &f16, &q[1..], &seen);
+                    assert!(got == want, "{} {head_dim}, {seen:?} of {capacity}", variant.name);
                 }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_group_has_the_bits_of_its_rows() {
+    let mut random = Random(72);
+    let (dim, capacity) = (64, 2 * CHUNK + 9);
+    let (k, v) = (random.floats(capacity * dim, 1.0), random.floats(capacity * dim, 1.0));
+    let (k16, v16): (Vec<_>, Vec<_>) = k.iter().zip(&v).map(|(&k, &v)| (f16::from_f32(k), f16::from_f32(v))).unzip();
+    let f32 = Head { k: &k, v: &v, dim, capacity };
+    let f16 = Head { k: &k16, v: &v16, dim, capacity };
+    let q = random.floats(MAX_GROUP * dim, 1.0);
+    let seen = [(capacity - 3, 90, 0), (capacity - 2, 90, 1), (1, CHUNK, 4), (1, CHUNK + 3, 4), (0, 2 * CHUNK, 3)];
+    for variant in available(VARIANTS) {
+        let whole = run(variant, &f32, &f16, &q, &seen);
+        for (r, q) in q.chunks_exact(dim).enumerate() {
+            let alone = run(variant, &f32, &f16, q, &seen[r..=r]);
+            for (whole, alone) in whole.iter().zip(&alone) {
+                assert!(whole[1 + r * dim..][..dim] == alone[1..], "{} row {r}", variant.name);
             }
         }
     }
@@ -42,26 +78,32 @@ fn one_token_is_copied_and_equal_scores_average() {
     for variant in available(VARIANTS) {
         let k = [0.0f32; 6];
         let v = [1.0f32, 2.0, 3.0, 4.0, 8.0, 9.0];
-        let mut y = [0.0; 2];
-        let mut head = Head { k: &k, v: &v, dim: 2, capacity: 3, slot: 2, len: 1 };
-        // SAFETY: `available` yields only what this CPU can run.
-        unsafe { (variant.run.f32)(&head, &[3.0, 4.0], &mut y) };
-        assert_eq!(y, [8.0, 9.0], "{}", variant.name);
-        head.len = 2;
-        // SAFETY: as above.
-        unsafe { (variant.run.f32)(&head, &[3.0, 4.0], &mut y) };
-        assert_eq!(y, [4.5, 5.5], "{}", variant.name);
+        let head = Head { k: &k, v: &v, dim: 2, capacity: 3 };
+        let mut result = |len| {
+            let mut y = [0.0; 2];
+            // SAFETY: `available` yields only what this CPU can run.
+            unsafe { (variant.run.f32)(&head, &mut [Row { q: &[3.0, 4.0], y: &mut y, slot: 2, len, shift: 0 }]) };
+            y
+        };
+        assert_eq!(result(1), [8.0, 9.0], "{}", variant.name);
+        assert_eq!(result(2), [4.5, 5.5], "{}", variant.name);
     }
 }
 
 #[test]
-fn a_nan_in_the_cache_shows() {
+fn a_nan_in_the_cache_shows_where_it_is_seen_alone() {
     for variant in available(VARIANTS) {
-        let (k, v) = ([f32::NAN, 1.0, 1.0], [1.0f32, 1.0, 1.0]);
-        let head = Head { k: &k, v: &v, dim: 1, capacity: 3, slot: 1, len: 3 };
-        let mut y = [0.0];
-        // SAFETY: `available` yields only what this CPU can run.
-        unsafe { (variant.run.f32)(&head, &[1.0], &mut y) };
-        assert!(y[0].is_nan(), "{}", variant.name);
+        for dim in [1, 16] {
+            let k = [vec![f32::NAN; dim], vec![1.0; 2 * dim]].concat();
+            let v = vec![1.0f32; 3 * dim];
+            let head = Head { k: &k, v: &v, dim, capacity: 3 };
+            let (q, mut y) = (vec![1.0; dim], [vec![0.0; dim], vec![0.0; dim]]);
+            let [a, b] = &mut y;
+            let rows = [(a, 3, 0), (b, 2, 0)];
+            let mut rows = rows.map(|(y, len, shift)| Row { q: &q, y, slot: 1, len, shift });
+            // SAFETY: `available` yields only what this CPU can run.
+            unsafe { (variant.run.f32)(&head, &mut rows) };
+            assert!(y[0][0].is_nan() && y[1][0] == 1.0, "{}", variant.name);
+        }
     }
 }
