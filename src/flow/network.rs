@@ -90,6 +90,11 @@ impl FlowNet {
         })
     }
 
+    /// The layer that probably runs after layer `i`: the last one's is the first of the next evaluation.
+    pub(super) fn layer_after(&self, i: usize) -> Option<&Layer> {
+        self.layers.get(i + 1).or(self.layers.first())
+    }
+
     /// Bytes of the packed matrices that one evaluation reads.
     pub fn pass_bytes(&self) -> usize {
         self.layers.iter().map(Layer::bytes).sum::<usize>() + self.input_latent.bytes() + self.out.bytes()

@@ -105,13 +105,23 @@ impl SharedPass {
         let Self { scratch, phases, index, x, rows, .. } = self;
         for (l, layer) in net.layers.iter().enumerate() {
             let norms = modulation.layer(l, index);
-            layer.run(exec, heads, norms, phases, *rows, scratch, x, &mut |exec, qkv, out| {
-                let mut from = 0;
-                for generator in members.iter_mut().flatten().map(generator) {
-                    let (qkv, out) = (&qkv[from * 3 * d..], &mut out[from * d..]);
-                    from += generator.part().map_or(0, |part| part.slots.attend(exec, l, qkv, out));
-                }
-            });
+            layer.run(
+                exec,
+                heads,
+                norms,
+                phases,
+                *rows,
+                scratch,
+                x,
+                &mut |exec, qkv, out| {
+                    let mut from = 0;
+                    for generator in members.iter_mut().flatten().map(generator) {
+                        let (qkv, out) = (&qkv[from * 3 * d..], &mut out[from * d..]);
+                        from += generator.part().map_or(0, |part| part.slots.attend(exec, l, qkv, out));
+                    }
+                },
+                net.layer_after(l),
+            );
         }
         let mut from = 0;
         for generator in members.iter_mut().flatten().map(generator) {

@@ -296,9 +296,19 @@ impl Slots {
         let Self { modulation, mod_index, cache, rows, phases, scratch, x, .. } = &mut *self;
         for (i, layer) in net.layers.iter().enumerate() {
             let norms = modulation.layer(i, mod_index);
-            layer.run(exec, heads, norms, phases, n, scratch, x, &mut |exec, qkv, out| {
-                rows.attend(exec, i, cache, qkv, out);
-            });
+            layer.run(
+                exec,
+                heads,
+                norms,
+                phases,
+                n,
+                scratch,
+                x,
+                &mut |exec, qkv, out| {
+                    rows.attend(exec, i, cache, qkv, out);
+                },
+                net.layer_after(i),
+            );
         }
         self.finish(exec, net, history, slot, commit, new.is_some());
     }

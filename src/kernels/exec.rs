@@ -1,12 +1,10 @@
 //! [`Exec`]: kernels, threads and scratch of one session; the one object that networks call.
 
-use std::ops::Range;
-
 use super::Kernels;
 use super::activations::Activations;
 use super::attend::{Head, KvCache, MAX_GROUP, Row, Span, Store};
 use super::linear::{LINE, by_rows};
-use super::packed::{Buffer, MAX_ROWS};
+use super::packed::{Buffer, MAX_ROWS, Onward};
 use super::quantize_rows::GROUP;
 use crate::error::{Error, ErrorKind, Result};
 use crate::par::{FlushToZero, Pool};
@@ -58,6 +56,8 @@ pub struct Exec {
     pub(super) q: Buffer,
     pub(super) wide: Buffer,
     pub(super) sums: Vec<i32>,
+    /// Where the linear layer after the next one begins.
+    pub(super) upcoming: Option<[Onward; 2]>,
     flush: Option<FlushToZero>,
     pub(super) activations: Option<Activations>,
 }
@@ -100,6 +100,7 @@ impl Exec {
             q: Buffer::new(n),
             wide: Buffer::new(2 * n),
             sums: vec![0; n / GROUP],
+            upcoming: None,
             flush: None,
             activations: None,
         })
@@ -201,16 +202,15 @@ impl Exec {
         }
         let (kernels, y) = (&self.kernels, Shared(y.as_mut_ptr()));
         for start in (0..rows).step_by(MAX_SPANS) {
-            let (groups, n) = groups(&spans[start..rows.min(start + MAX_SPANS)]);
+            let spans = &spans[start..rows.min(start + MAX_SPANS)];
+            let (groups, n) = groups(spans);
             // One piece is one head of one group: a group's keys are read once.
             self.pool.run(n * heads, &|piece, _| {
-                let (head, group) = (piece % heads, &groups[piece / heads]);
-                let first = group.clone().map(|i| spans[start + i].first).min().unwrap_or(0);
-                let mut group = group.clone();
-                let n = group.len();
-                let mut rows: [Row<'_>; MAX_GROUP] = std::array::from_fn(|_| match group.next() {
-                    Some(i) => {
-                        let (r, span) = (start + i, spans[start + i]);
+                let (head, group) = (piece % heads, groups[piece / heads].rows());
+                let first = group.iter().map(|&i| spans[usize::from(i)].first).min().unwrap_or(0);
+                let mut rows: [Row<'_>; MAX_GROUP] = std::array::from_fn(|i| match group.get(i) {
+                    Some(&i) => {
+                        let (r, span) = (start + usize::from(i), spans[usize::from(i)]);
                         Row {
                             q: &q[r * row_stride + head * head_dim..][..head_dim],
                             // SAFETY: in y, and each row's head is in one piece.
@@ -222,7 +222,7 @@ impl Exec {
                     }
                     None => Row { q: &[], y: &mut [], slot: 0, len: 0, shift: 0 },
                 });
-                let (rows, ring) = (&mut rows[..n], spans[start + groups[piece / heads].start].ring);
+                let (rows, ring) = (&mut rows[..group.len()], spans[usize::from(group[0])].ring);
                 // SAFETY: a `Kernels` exists only for a level that this CPU has.
                 unsafe {
                     match &cache.store {
@@ -259,18 +259,38 @@ const MAX_SPANS: usize = 64;
 /// Spans of one group begin at most this many tokens apart: what only some of its rows see is read for each of them.
 const MAX_SHIFT: u64 = 8;
 
-/// Neighbouring spans of one ring, up to [`MAX_GROUP`], and the number of groups.
-fn groups(spans: &[Span]) -> ([Range<usize>; MAX_SPANS], usize) {
-    let mut groups = [const { 0..0 }; MAX_SPANS];
-    let (mut n, mut start) = (0, 0);
-    for i in 1..=spans.len() {
-        let near = |s: &Span| {
-            s.ring == spans[start].ring && spans[start..i].iter().all(|t| s.first.abs_diff(t.first) <= MAX_SHIFT)
+/// Rows whose spans lie in one ring, near each other.
+#[derive(Clone, Copy)]
+struct Group {
+    rows: [u8; MAX_GROUP],
+    len: usize,
+}
+
+impl Group {
+    /// At least one.
+    fn rows(&self) -> &[u8] {
+        &self.rows[..self.len]
+    }
+}
+
+/// Groups that hold each of the spans once, and their number.
+fn groups(spans: &[Span]) -> ([Group; MAX_SPANS], usize) {
+    let mut groups = [Group { rows: [0; MAX_GROUP], len: 0 }; MAX_SPANS];
+    let mut n = 0;
+    for (i, span) in spans.iter().enumerate() {
+        let near = |group: &Group| {
+            group.len < MAX_GROUP
+                && group
+                    .rows()
+                    .iter()
+                    .map(|&j| &spans[usize::from(j)])
+                    .all(|other| other.ring == span.ring && other.first.abs_diff(span.first) <= MAX_SHIFT)
         };
-        if i == spans.len() || i - start == MAX_GROUP || !near(&spans[i]) {
-            groups[n] = start..i;
-            (n, start) = (n + 1, i);
-        }
+        let at = groups[..n].iter().position(near).unwrap_or(n);
+        n = n.max(at + 1);
+        let group = &mut groups[at];
+        group.rows[group.len] = i as u8;
+        group.len += 1;
     }
     (groups, n)
 }

@@ -3,10 +3,10 @@
 use super::epilogue::{Finish, Sums};
 use super::exec::{Exec, RowTable, Shared};
 use super::matrix::{Body, Matrix};
-use super::packed::{Buffer, MAX_PANELS, MAX_ROWS, NR, TILE_COLS, Tile};
+use super::packed::{Buffer, MAX_PANELS, MAX_ROWS, NR, Onward, TILE_COLS, Tile};
 use super::quantize_rows::GROUP;
 use super::{Kernels, matmul_f32_f32, matmul_i8dx_i4g, matmul_i8dx_i8cx};
-use crate::par::Pool;
+use crate::par::{Next, Pool};
 
 /// What [`Exec::linear`] does with xW' + b.
 #[derive(Debug, Clone, Copy)]
@@ -30,16 +30,34 @@ impl Exec {
         if let Some(activations) = &mut self.activations {
             activations.listen(&w.name, x, w.cols);
         }
+        let upcoming = self.upcoming.take();
         let most = if w.split { MAX_ROWS / 2 } else { MAX_ROWS };
         for start in (0..rows).step_by(most) {
             let n = most.min(rows - start);
             let x = &x[start * w.cols..][..n * w.cols];
-            self.portion(w, x, start, n, &mut y[start * w.out..][..n * w.out], e);
+            // Another portion reads these weights again.
+            let after = if start + n < rows { w.ends() } else { upcoming };
+            self.portion(w, x, start, n, &mut y[start * w.out..][..n * w.out], e, after);
         }
     }
 
-    /// At most 16 rows, 8 of those that are split; `start` is the first one's number in gate tables.
-    fn portion(&mut self, w: &Matrix, x: &[f32], start: usize, rows: usize, y: &mut [f32], e: Epilogue<'_>) {
+    /// Says that the linear layer after the next one is of `w`: threads that run out of the one's weights prefetch the other's.
+    pub fn expect(&mut self, w: &Matrix) {
+        self.upcoming = w.ends();
+    }
+
+    /// At most 16 rows, 8 of those that are split; `start` is the first one's number in gate tables, `after` what is read next.
+    #[allow(clippy::too_many_arguments, reason = "a layer's operands, and where they are in the whole")]
+    fn portion(
+        &mut self,
+        w: &Matrix,
+        x: &[f32],
+        start: usize,
+        rows: usize,
+        y: &mut [f32],
+        e: Epilogue<'_>,
+        after: Option<[Onward; 2]>,
+    ) {
         let Self { kernels, pool, x: padded, q, wide, sums, .. } = self;
         let y = Shared(y.as_mut_ptr());
         let rows_of_q = if w.split { 2 * rows } else { rows };
@@ -61,9 +79,12 @@ impl Exec {
             unsafe { (kernels.epilogue.run)(sums, &w.bias[from..], finish, y) }
         };
         let span = |tile: usize| (tile * MAX_PANELS, MAX_PANELS.min(panels - tile * MAX_PANELS));
-        // Bytes from a tile to the one after it, which prefetching goes on with.
-        let step = |tile: usize, next: usize, panel: usize| {
-            if next < tiles { (next as isize - tile as isize) * (MAX_PANELS * panel) as isize } else { 0 }
+        // Where a thread reads on: in this matrix, or at an end of the next one.
+        let onward = |next: Next, weights: &[u8], panel: usize| match (next, after) {
+            (Next::Piece(tile), _) => Onward::new(weights, tile * MAX_PANELS * panel, panel),
+            (Next::First, Some([first, _])) => first,
+            (Next::Last, Some([_, last])) => last,
+            (Next::First | Next::Last, None) => Onward::new(weights, 0, panel),
         };
 
         match &w.body {
@@ -104,7 +125,7 @@ impl Exec {
                 pool.run(tiles, &|t, next| {
                     let (first, panels) = span(t);
                     let mut tile: Tile<i32> = [[0; TILE_COLS]; MAX_ROWS];
-                    let next = step(t, next, geo.panel);
+                    let next = onward(next, weights, geo.panel);
                     let (geo, rows) = (*geo, rows_of_q);
                     let job = matmul_i8dx_i8cx::Job { q, wide, sums, stride, rows, weights, geo, first, panels, next };
                     // SAFETY: a matrix holds a variant that this CPU can run.
@@ -129,7 +150,7 @@ impl Exec {
                 pool.run(tiles, &|t, next| {
                     let (first, panels) = span(t);
                     let mut tile: Tile<f32> = [[0.0; TILE_COLS]; MAX_ROWS];
-                    let next = step(t, next, geo.panel);
+                    let next = onward(next, weights, geo.panel);
                     let (geo, rows) = (*geo, rows_of_q);
                     let job = matmul_i8dx_i4g::Job { q, sums, stride, rows, weights, scales, geo, first, panels, next };
                     // SAFETY: a matrix holds a variant that this CPU can run.

@@ -2,7 +2,7 @@
 
 use half::f16;
 
-use super::packed::{Buffer, FloatGeometry, NR};
+use super::packed::{Buffer, FloatGeometry, MAX_PANELS, NR, Onward, TILE_COLS};
 use super::weights::{Scheme, WeightData, Weights};
 use super::{Kernels, Variant, matmul_f32_f16, matmul_f32_f32, matmul_i8dx_i4g, matmul_i8dx_i8cx};
 
@@ -105,6 +105,17 @@ impl Matrix {
                 Body::F32(b, ..) | Body::F16(b, ..) | Body::I4(b, ..) => b.bytes(),
                 Body::I8(b, _, scale, _) => b.bytes() + 4 * scale.len(),
             }
+    }
+
+    /// Where the threads begin to read integer weights: one at the first tile, the other at the last.
+    pub(super) fn ends(&self) -> Option<[Onward; 2]> {
+        let (weights, panel) = match &self.body {
+            Body::F32(..) | Body::F16(..) => return None,
+            Body::I8(buffer, geo, ..) => (buffer.of::<u8>(), geo.panel),
+            Body::I4(buffer, geo, _) => (buffer.of::<u8>(), geo.panel),
+        };
+        let last = (self.out - 1) / TILE_COLS * MAX_PANELS * panel;
+        Some([0, last].map(|at| Onward::new(weights, at, panel)))
     }
 
     /// Scheme of the weights.

@@ -13,6 +13,28 @@ pub(crate) const TILE_COLS: usize = NR * MAX_PANELS;
 /// Rows of one kernel call, at most.
 pub(crate) const MAX_ROWS: usize = 16;
 
+/// Where a thread probably reads on after a tile: a hint for prefetching, which need not be memory.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Onward {
+    at: usize,
+    /// Bytes from one panel to the next.
+    panel: usize,
+}
+
+impl Onward {
+    /// At tiles of weights that begin `at`.
+    pub(crate) fn new(weights: &[u8], at: usize, panel: usize) -> Self {
+        Self { at: weights.as_ptr().addr().wrapping_add(at), panel }
+    }
+
+    /// Byte `at` of panel `p` from there.
+    #[allow(dead_code, reason = "some levels prefetch")]
+    #[inline(always)]
+    pub(crate) fn byte(&self, p: usize, at: isize) -> *const u8 {
+        std::ptr::without_provenance(self.at.wrapping_add(p * self.panel).wrapping_add_signed(at))
+    }
+}
+
 /// Rows x columns of results of one kernel call, before bias and epilogue.
 pub(crate) type Tile<T> = [[T; TILE_COLS]; MAX_ROWS];
 

@@ -119,7 +119,8 @@ impl Layer {
         [&self.qkv, &self.proj, &self.fc1, &self.fc2].into_iter().map(Matrix::bytes).sum()
     }
 
-    /// Runs the layer over `x` (`n x d`, in place). `attention` is [`Rows::attend`] of each of the caches that the rows belong to.
+    /// Runs the layer over `x` (`n x d`, in place). `attention` is [`Rows::attend`] of each of the caches that the rows belong to;
+    /// `next` is the layer that will probably run after this one.
     #[allow(clippy::too_many_arguments, reason = "a layer's pass needs all of them, and they have no natural owner")]
     pub fn run(
         &self,
@@ -131,6 +132,7 @@ impl Layer {
         scratch: &mut Scratch,
         x: &mut [f32],
         attention: &mut Attention<'_>,
+        next: Option<&Layer>,
     ) {
         let d = self.proj.out_features();
         let x = &mut x[..n * d];
@@ -139,14 +141,20 @@ impl Layer {
         let hidden = &mut scratch.hidden[..n * self.fc1.out_features()];
 
         exec.norm(x, n, d, norms.norm1.0, norms.norm1.1, normed);
+        exec.expect(&self.proj);
         exec.linear(&self.qkv, normed, n, qkv, Epilogue::Store);
         let half = n * d / heads / 2;
         exec.rope(qkv, n, 3 * d, 2 * heads, d / heads, &phases.cos[..half], &phases.sin[..half]);
         attention(exec, qkv, normed);
+        exec.expect(&self.fc1);
         exec.linear(&self.proj, normed, n, x, gated(norms.gate1));
 
         exec.norm(x, n, d, norms.norm2.0, norms.norm2.1, normed);
+        exec.expect(&self.fc2);
         exec.linear(&self.fc1, normed, n, hidden, Epilogue::Gelu);
+        if let Some(next) = next {
+            exec.expect(&next.qkv);
+        }
         exec.linear(&self.fc2, hidden, n, x, gated(norms.gate2));
     }
 }

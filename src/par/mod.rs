@@ -10,4 +10,4 @@ mod pool;
 
 pub use cores::{current_thread_id, pin_current_thread};
 pub use denormals::FlushToZero;
-pub use pool::Pool;
+pub use pool::{Next, Pool};

@@ -18,8 +18,19 @@ const MAX_PIECES: usize = u16::MAX as usize;
 /// Spins before the caller lets another thread have its core; about a millisecond, reached only where the helper lost its own.
 const SPINS: u32 = 1 << 15;
 
-/// A piece, and the one that this thread takes after it if there is one left.
-type Work<'a> = dyn Fn(usize, usize) + Sync + 'a;
+/// Where a thread probably goes on after a piece: a hint for prefetching.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Next {
+    /// With this piece.
+    Piece(usize),
+    /// With the first piece of the next run.
+    First,
+    /// With the last piece of the next run.
+    Last,
+}
+
+/// A piece, and where the thread goes on.
+type Work<'a> = dyn Fn(usize, Next) + Sync + 'a;
 
 /// Keeps what the threads write out of each other's cache lines.
 #[repr(align(128))]
@@ -45,8 +56,8 @@ unsafe impl Sync for Shared {}
 unsafe impl Send for Shared {}
 
 impl Shared {
-    /// Takes a piece of the current run, from the front or the back.
-    fn take(&self, front: bool) -> Option<usize> {
+    /// Takes a piece of the current run, from the front or the back. Of two that are left the other thread takes the second.
+    fn take(&self, front: bool) -> Option<(usize, Next)> {
         let mut seen = self.ticket.0.load(Ordering::Relaxed);
         loop {
             let (first, end) = ((seen >> 16) & 0xffff, seen & 0xffff);
@@ -55,7 +66,15 @@ impl Shared {
             }
             let (piece, next) = if front { (first, seen + (1 << 16)) } else { (end - 1, seen - 1) };
             match self.ticket.0.compare_exchange_weak(seen, next, Ordering::Acquire, Ordering::Relaxed) {
-                Ok(_) => return Some(piece as usize),
+                Ok(_) => {
+                    let next = match (end - first > 2, front) {
+                        (true, true) => Next::Piece(piece as usize + 1),
+                        (true, false) => Next::Piece(piece as usize - 1),
+                        (false, true) => Next::First,
+                        (false, false) => Next::Last,
+                    };
+                    return Some((piece as usize, next));
+                }
                 Err(now) => seen = now,
             }
         }
@@ -69,7 +88,7 @@ impl Shared {
             }
             let _flush = FlushToZero::new();
             while self.awake.0.load(Ordering::Relaxed) {
-                let Some(piece) = self.take(false) else {
+                let Some((piece, next)) = self.take(false) else {
                     std::hint::spin_loop();
                     continue;
                 };
@@ -77,7 +96,7 @@ impl Shared {
                 let work = unsafe { (*self.work.get()).map(|w| &*w) };
                 let outcome = catch_unwind(AssertUnwindSafe(|| {
                     if let Some(work) = work {
-                        work(piece, piece.wrapping_sub(1));
+                        work(piece, next);
                     }
                 }));
                 if let Err(payload) = outcome {
@@ -158,15 +177,15 @@ impl Pool {
     }
 
     /// Calls `work(i, next)` once for each i in `0..pieces`, here and on the helper if it is awake; returns when all have returned.
-    /// `next` is the piece that the same thread will take next, unless the other one is faster or it is not below `pieces`: a hint for
-    /// prefetching.
+    /// `next` is where the same thread goes on, unless the other one is faster.
     ///
     /// # Panics
     /// With the panic of a piece, after all pieces that were begun have ended. With more than 65,535 pieces.
-    pub fn run(&mut self, pieces: usize, work: &(dyn Fn(usize, usize) + Sync)) {
+    pub fn run(&mut self, pieces: usize, work: &(dyn Fn(usize, Next) + Sync)) {
         let awake = self.helper.is_some() && self.shared.awake.0.load(Ordering::Relaxed);
         if pieces < 2 || !awake {
-            (0..pieces).for_each(|piece| work(piece, piece + 1));
+            (0..pieces)
+                .for_each(|piece| work(piece, if piece + 1 < pieces { Next::Piece(piece + 1) } else { Next::First }));
             return;
         }
         assert!(pieces <= MAX_PIECES, "too many pieces");
@@ -180,9 +199,9 @@ impl Pool {
 
         let mut mine = 0u32;
         let outcome = catch_unwind(AssertUnwindSafe(|| {
-            while let Some(piece) = shared.take(true) {
+            while let Some((piece, next)) = shared.take(true) {
                 mine += 1;
-                work(piece, piece + 1);
+                work(piece, next);
             }
         }));
         while shared.take(true).is_some() {
@@ -241,7 +260,10 @@ mod tests {
                 for pieces in (0..200).chain([1000]) {
                     let counts: Vec<AtomicUsize> = (0..pieces).map(|_| AtomicUsize::new(0)).collect();
                     pool.run(pieces, &|i, next| {
-                        assert!(next == i + 1 || next == i.wrapping_sub(1));
+                        assert!(match next {
+                            Next::Piece(next) => next.abs_diff(i) == 1 && next < pieces,
+                            Next::First | Next::Last => true,
+                        });
                         counts[i].fetch_add(1, Ordering::Relaxed);
                     });
                     assert!(counts.iter().all(|c| c.load(Ordering::Relaxed) == 1));

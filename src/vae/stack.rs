@@ -104,9 +104,19 @@ impl Stack {
             };
             let heads = self.config.heads;
             let StackState { cache, rows, phases, scratch, x, .. } = &mut *state;
-            layer.run(exec, heads, norms, phases, n as usize, scratch, x, &mut |exec, qkv, out| {
-                rows.attend(exec, i, cache, qkv, out);
-            });
+            layer.run(
+                exec,
+                heads,
+                norms,
+                phases,
+                n as usize,
+                scratch,
+                x,
+                &mut |exec, qkv, out| {
+                    rows.attend(exec, i, cache, qkv, out);
+                },
+                self.layers.get(i + 1).map(|(layer, _)| layer),
+            );
         }
         let (shift, scale) = self.final_norm.tables(d, index);
         exec.norm(&state.x, n as usize, d, shift, scale, &mut state.normed);

@@ -18,7 +18,10 @@ const AHEAD: usize = 8;
 pub(super) unsafe fn attend<L: Sixteen, T: Stored>(head: &Head<'_, T>, rows: &mut [Row<'_>]) {
     head.check(rows);
     if !head.dim.is_multiple_of(16) {
-        return rows.iter_mut().for_each(|row| scalar::row(head, row, T::to_f32));
+        for row in rows {
+            scalar::row(head, row, T::to_f32);
+        }
+        return;
     }
     let (mut top, mut total) = ([f32::NEG_INFINITY; MAX_GROUP], [0.0f32; MAX_GROUP]);
     let longest = rows.iter().map(|r| r.len).max().unwrap_or(0);
@@ -81,18 +84,18 @@ impl Chunk {
     /// As [`Sixteen`].
     #[inline(always)]
     unsafe fn each<L: Sixteen, T: Stored, S: Step>(&self, head: &Head<'_, T>, rows: &mut [Row<'_>], p: &mut Weights) {
-        let alone = |rows: &mut [Row<'_>], p: &mut Weights, r: usize, tokens: Range<usize>| {
-            if !tokens.is_empty() {
-                let (row, p) = (&mut rows[r..=r], &mut p[r..=r]);
-                // SAFETY: promised by the caller; `tokens` are within the chunk.
-                unsafe { S::run::<L, T, 1>(head, row, p, &self.tokens[r..=r], tokens) };
-            }
-        };
         let n = rows.len();
         if n == 1 || self.common.is_empty() {
-            return (0..n).for_each(|r| alone(rows, p, r, self.tokens[r].clone()));
+            for r in 0..n {
+                // SAFETY: promised by the caller.
+                unsafe { self.alone::<L, T, S>(head, rows, p, r, self.tokens[r].clone()) };
+            }
+            return;
         }
-        (0..n).for_each(|r| alone(rows, p, r, self.tokens[r].start..self.common.start));
+        for r in 0..n {
+            // SAFETY: promised by the caller; `common` begins in every chunk.
+            unsafe { self.alone::<L, T, S>(head, rows, p, r, self.tokens[r].start..self.common.start) };
+        }
         let (all, tokens) = (&self.tokens[..n], self.common.clone());
         // SAFETY: promised by the caller; `common` is within every chunk.
         unsafe {
@@ -104,7 +107,30 @@ impl Chunk {
                 _ => unreachable!("groups were checked"),
             }
         }
-        (0..n).for_each(|r| alone(rows, p, r, self.common.end..self.tokens[r].end));
+        for r in 0..n {
+            // SAFETY: promised by the caller; `common` ends in every chunk.
+            unsafe { self.alone::<L, T, S>(head, rows, p, r, self.common.end..self.tokens[r].end) };
+        }
+    }
+
+    /// Has `S` work through `tokens` of the chunk of row `r`.
+    ///
+    /// # Safety
+    /// As [`Sixteen`]; `tokens` are the chunk's.
+    #[inline(always)]
+    unsafe fn alone<L: Sixteen, T: Stored, S: Step>(
+        &self,
+        head: &Head<'_, T>,
+        rows: &mut [Row<'_>],
+        p: &mut Weights,
+        r: usize,
+        tokens: Range<usize>,
+    ) {
+        if !tokens.is_empty() {
+            let (row, p) = (&mut rows[r..=r], &mut p[r..=r]);
+            // SAFETY: promised by the caller.
+            unsafe { S::run::<L, T, 1>(head, row, p, &self.tokens[r..=r], tokens) };
+        }
     }
 }
 

@@ -79,7 +79,7 @@ fn one_token_is_copied_and_equal_scores_average() {
         let k = [0.0f32; 6];
         let v = [1.0f32, 2.0, 3.0, 4.0, 8.0, 9.0];
         let head = Head { k: &k, v: &v, dim: 2, capacity: 3 };
-        let mut result = |len| {
+        let result = |len| {
             let mut y = [0.0; 2];
             // SAFETY: `available` yields only what this CPU can run.
             unsafe { (variant.run.f32)(&head, &mut [Row { q: &[3.0, 4.0], y: &mut y, slot: 2, len, shift: 0 }]) };

@@ -3,7 +3,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{GROUP, Geometry, Job, NR, Tile};
+use super::{GROUP, Geometry, Job, NR, Onward, Tile};
 
 /// Bytes ahead of each panel that are asked for; at its end, those of the panel that this thread reads next. These panels are asked for
 /// too, all the way, into the second-level cache: four panels alone are too few streams for the memory.
@@ -54,22 +54,21 @@ fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, ti
     let sums = &job.sums[row * groups..][..R * groups];
     let low = _mm512_set1_epi8(15);
     // The next panels of this tile, or those of the next tile.
-    let next = if p + P < job.panels { (P * panel) as isize } else { job.next - (p * panel) as isize };
+    let next = if p + P < job.panels { Onward::new(job.weights, start + P * panel, panel) } else { job.next };
+    let own = Onward::new(job.weights, start, panel);
     let mut total = [[_mm512_setzero_ps(); P]; R];
     for g in 0..groups {
         let at = Geometry::nibbles(g);
-        let ahead = if at + AHEAD < panel { at as isize } else { next + at as isize - panel as isize };
-        // May point anywhere, both.
-        let far = weights.wrapping_offset(ahead + AHEAD as isize);
-        let later = weights.wrapping_offset(next + at as isize);
+        let far = (at + AHEAD) as isize;
+        let (far, line) = if at + AHEAD < panel { (own, far) } else { (next, far - panel as isize) };
         let start: [i32; R] = std::array::from_fn(|r| -8 * sums[r * groups + g]);
         for c in 0..P {
             let mut acc: [__m512i; R] = start.map(|s| _mm512_set1_epi32(s));
             for j in 0..GROUP / 8 {
                 // SAFETY: line j of group g of panel c, within the slice; a prefetch may point anywhere.
                 let w = unsafe {
-                    _mm_prefetch::<_MM_HINT_T0>(far.wrapping_add(c * panel + j * 64).cast());
-                    _mm_prefetch::<_MM_HINT_T1>(later.wrapping_add(c * panel + j * 64).cast());
+                    _mm_prefetch::<_MM_HINT_T0>(far.byte(c, line + j as isize * 64).cast());
+                    _mm_prefetch::<_MM_HINT_T1>(next.byte(c, (at + j * 64) as isize).cast());
                     _mm512_loadu_si512(weights.add(c * panel + at + j * 64).cast())
                 };
                 let (a, b) = (_mm512_and_si512(w, low), _mm512_and_si512(_mm512_srli_epi16::<4>(w), low));
@@ -85,8 +84,8 @@ fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, ti
             }
             // SAFETY: the 16 scales of group g of panel c; a prefetch may point anywhere.
             let scale = _mm512_cvtph_ps(unsafe {
-                _mm_prefetch::<_MM_HINT_T0>(far.wrapping_add(c * panel + 256).cast());
-                _mm_prefetch::<_MM_HINT_T1>(later.wrapping_add(c * panel + 256).cast());
+                _mm_prefetch::<_MM_HINT_T0>(far.byte(c, line + 256).cast());
+                _mm_prefetch::<_MM_HINT_T1>(next.byte(c, at as isize + 256).cast());
                 _mm256_loadu_si256(scales.add(c * panel / 2 + Geometry::scales(g)).cast())
             });
             for (total, acc) in total.iter_mut().zip(acc) {

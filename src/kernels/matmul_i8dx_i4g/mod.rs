@@ -9,7 +9,7 @@
 
 use half::f16;
 
-use super::packed::{NR, Tile};
+use super::packed::{NR, Onward, Tile};
 use super::quantize_rows::GROUP;
 use super::{Level, Variant};
 
@@ -108,9 +108,8 @@ pub(crate) struct Job<'a> {
     pub(crate) geo: Geometry,
     pub(crate) first: usize,
     pub(crate) panels: usize,
-    /// Bytes from the first panel to where this thread will probably go on: a hint for prefetching.
-    #[allow(dead_code, reason = "some variants read it")]
-    pub(crate) next: isize,
+    #[allow(dead_code, reason = "some variants prefetch")]
+    pub(crate) next: Onward,
 }
 
 impl Job<'_> {

@@ -40,7 +40,8 @@ fn compare(
     let (weights, scales) = (buffer.of::<u8>(), buffer.of::<f16>());
     let first = random.below(3);
     let panels = (1 + random.below(4)).min(6 - first);
-    let job = Job { q, sums: &sums, stride, rows, weights, scales, geo, first, panels, next: 0 };
+    let job =
+        Job { q, sums: &sums, stride, rows, weights, scales, geo, first, panels, next: Onward::new(weights, 0, 0) };
     let run = |v: &crate::kernels::Variant<super::Run>| {
         let mut tile: Tile<f32> = [[7.0; TILE_COLS]; 16];
         // SAFETY: `available` yields only what this CPU can run.

@@ -3,7 +3,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{Job, NR, Tile};
+use super::{Job, NR, Onward, Tile};
 use crate::kernels::packed::for_rows;
 use crate::kernels::quantize_rows::GROUP;
 
@@ -42,8 +42,9 @@ fn rows<const R: usize>(job: &Job<'_>, row: usize, tile: &mut Tile<i32>) {
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
 fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<i32>) {
-    let padded = job.geo.padded;
-    let weights = job.weights[(job.first + p) * job.geo.panel..][..P * job.geo.panel].as_ptr();
+    let (padded, panel) = (job.geo.padded, job.geo.panel);
+    let start = (job.first + p) * panel;
+    let weights = job.weights[start..][..P * panel].as_ptr();
     let q = job.q[row * job.stride..][..R * job.stride].as_ptr();
     let groups = padded / GROUP;
     let mut acc = [[_mm512_setzero_si512(); P]; R];
@@ -54,20 +55,17 @@ fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, ti
     let quads = padded / 4;
     let part = quads / STREAMS;
     // The next panels of this tile, or those of the next tile.
-    let next = if p + P < job.panels { P as isize } else { -(p as isize) } * job.geo.panel as isize;
-    let next = if p + P < job.panels { next } else { next + job.next };
+    let own = Onward::new(job.weights, start, panel);
+    let next = if p + P < job.panels { Onward::new(job.weights, start + P * panel, panel) } else { job.next };
     for k in 0..part {
-        let ahead = (k + AHEAD) as isize;
-        let ahead = if k + AHEAD < part { 64 * ahead } else { next + 64 * (ahead - part as isize) };
+        let (far, line) = if k + AHEAD < part { (own, k + AHEAD) } else { (next, k + AHEAD - part) };
         for s in 0..STREAMS {
-            // May point anywhere.
-            let far = weights.wrapping_add(s * part * 64).wrapping_offset(ahead);
-            let k = k + s * part;
+            let (k, line) = (k + s * part, 64 * (line + s * part) as isize);
             for c in 0..P {
                 // SAFETY: k < quads, so the line lies in panel c of the slice; a prefetch may point anywhere.
                 let w = unsafe {
-                    _mm_prefetch::<_MM_HINT_T0>(far.wrapping_add(c * job.geo.panel).cast());
-                    _mm512_loadu_si512(weights.add(c * job.geo.panel + k * 64).cast())
+                    _mm_prefetch::<_MM_HINT_T0>(far.byte(c, line).cast());
+                    _mm512_loadu_si512(weights.add(c * panel + k * 64).cast())
                 };
                 for r in 0..R {
                     // SAFETY: 4 bytes at column 4k of row r, within R rows, `stride` apart.

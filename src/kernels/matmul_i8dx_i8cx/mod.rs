@@ -5,7 +5,7 @@
 //! Contract of a variant: it fills the first `rows` rows and `16 panels` columns of the tile from a [`Job`] that [`Job::check`] accepts.
 //! Sums stay below 2^31 for up to 131,071 columns, also with weights offset to unsigned.
 
-use super::packed::{NR, Tile};
+use super::packed::{NR, Onward, Tile};
 use super::quantize_rows::GROUP;
 use super::{Level, Variant, interleave};
 
@@ -116,9 +116,8 @@ pub(crate) struct Job<'a> {
     pub(crate) geo: Geometry,
     pub(crate) first: usize,
     pub(crate) panels: usize,
-    /// Bytes from the first panel to where this thread will probably go on: a hint for prefetching.
-    #[allow(dead_code, reason = "some variants read it")]
-    pub(crate) next: isize,
+    #[allow(dead_code, reason = "some variants prefetch")]
+    pub(crate) next: Onward,
 }
 
 impl Job<'_> {

@@ -38,7 +38,8 @@ fn compare(random: &mut Random, rows: usize, cols: usize, w: &[i8], x: impl Fn(&
             assert_eq!(packed[..NR * padded], weights[p * geo.panel..][..NR * padded], "{} {cols}", v.name);
         }
         let wide = if v.run.wide { &wide[1..] } else { &[] };
-        let job = Job { q, wide, sums: &sums, stride, rows, weights, geo, first, panels, next: 0 };
+        let job =
+            Job { q, wide, sums: &sums, stride, rows, weights, geo, first, panels, next: Onward::new(weights, 0, 0) };
         let mut tile: Tile<i32> = [[7; TILE_COLS]; 16];
         // SAFETY: `available` yields only what this CPU can run.
         unsafe { (v.run.run)(&job, &mut tile) };
