@@ -172,12 +172,12 @@ impl FloatGeometry {
     }
 }
 
-/// Evaluates `$e` with the constant `$R` the number of rows, 1 to 16.
+/// Evaluates `$e` with the constant `$R` the number of rows, one of those listed or 1 to 16.
 macro_rules! for_rows {
     ($rows:expr, $R:ident => $e:expr) => {
-        for_rows!(@ $rows, $R, $e, 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16)
+        for_rows!($rows, $R in [1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16] => $e)
     };
-    (@ $rows:expr, $R:ident, $e:expr, $($n:literal)*) => {
+    ($rows:expr, $R:ident in [$($n:literal)*] => $e:expr) => {
         match $rows {
             $($n => { const $R: usize = $n; $e })*
             _ => unreachable!("rows were checked"),

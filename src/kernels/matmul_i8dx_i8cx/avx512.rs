@@ -15,33 +15,45 @@ const AHEAD: usize = 16;
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
 pub(super) fn run(job: &Job<'_>, tile: &mut Tile<i32>) {
     job.check();
-    // Of more rows than two panels have accumulators for, two portions: the second finds the weights in the cache.
-    let portion = if job.rows > 12 { job.rows.div_ceil(2) } else { job.rows };
-    for row in (0..job.rows).step_by(portion) {
-        for_rows!(portion.min(job.rows - row), R => rows::<R>(job, row, tile));
+    // Few rows wait for memory all the time, and looking further ahead than a few lines would cost them slots. More rows leave it idle
+    // unless the next tile is asked for evenly while they compute: by one portion, or by half in each of two where two panels have no
+    // accumulators for all rows; the second then finds the weights in the cache.
+    match job.rows {
+        ..8 => for_rows!(job.rows, R in [1 2 3 4 5 6 7] => rows::<R, NOTHING>(job, 0, tile)),
+        8..=12 => for_rows!(job.rows, R in [8 9 10 11 12] => rows::<R, ALL>(job, 0, tile)),
+        rows => {
+            for_rows!(rows.div_ceil(2), R in [7 8] => self::rows::<R, FIRST>(job, 0, tile));
+            for_rows!(rows / 2, R in [6 7 8] => self::rows::<R, SECOND>(job, rows.div_ceil(2), tile));
+        }
     }
 }
 
+/// Streams, a bit each, whose lines in the next tile are asked for.
+const NOTHING: u8 = 0b00;
+const FIRST: u8 = 0b01;
+const SECOND: u8 = 0b10;
+const ALL: u8 = FIRST | SECOND;
+
 /// Rows from `row`; as many panels at once as accumulators fit 24 registers.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
-fn rows<const R: usize>(job: &Job<'_>, row: usize, tile: &mut Tile<i32>) {
+fn rows<const R: usize, const FETCH: u8>(job: &Job<'_>, row: usize, tile: &mut Tile<i32>) {
     let mut p = 0;
     while R <= 6 && p + 4 <= job.panels {
-        block::<R, 4>(job, row, p, tile);
+        block::<R, 4, FETCH>(job, row, p, tile);
         p += 4;
     }
     while R <= 12 && p + 2 <= job.panels {
-        block::<R, 2>(job, row, p, tile);
+        block::<R, 2, FETCH>(job, row, p, tile);
         p += 2;
     }
     while p < job.panels {
-        block::<R, 1>(job, row, p, tile);
+        block::<R, 1, FETCH>(job, row, p, tile);
         p += 1;
     }
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
-fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<i32>) {
+fn block<const R: usize, const P: usize, const FETCH: u8>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<i32>) {
     let (padded, panel) = (job.geo.padded, job.geo.panel);
     let start = (job.first + p) * panel;
     let weights = job.weights[start..][..P * panel].as_ptr();
@@ -65,6 +77,9 @@ fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, ti
                 // SAFETY: k < quads, so the line lies in panel c of the slice; a prefetch may point anywhere.
                 let w = unsafe {
                     _mm_prefetch::<_MM_HINT_T0>(far.byte(c, line).cast());
+                    if FETCH >> s & 1 == 1 {
+                        _mm_prefetch::<_MM_HINT_T1>(job.next.byte(p + c, 64 * k as isize).cast());
+                    }
                     _mm512_loadu_si512(weights.add(c * panel + k * 64).cast())
                 };
                 for r in 0..R {
