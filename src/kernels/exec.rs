@@ -58,6 +58,8 @@ pub struct Exec {
     pub(super) sums: Vec<i32>,
     flush: Option<FlushToZero>,
     pub(super) activations: Option<Activations>,
+    /// What each thread has to itself while things are shared out whole.
+    pub(super) lanes: Option<Box<[Exec; 2]>>,
 }
 
 /// A pointer that the pieces of one run share; each writes a part of its own.
@@ -100,6 +102,7 @@ impl Exec {
             sums: vec![0; n / GROUP],
             flush: None,
             activations: None,
+            lanes: None,
         })
     }
 

@@ -3,13 +3,14 @@
 use super::SessionOptions;
 use super::anchor::Anchor;
 use super::governor::{Hold, Outlook, Plan, Work};
-use super::inputs::Inputs;
+use super::inputs::{Inputs, Listening, listen};
 use super::probe::{Probe, tell};
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::flow::{Condition, Generator, GeneratorOptions, SharedPass, normal};
 use crate::frame::{BLOCK_FRAMES, FPS, Frame, Sampler};
 use crate::kernels::Exec;
+use crate::par::Pool;
 use crate::pose::{self, gaze_score};
 use crate::vae::DecoderState;
 
@@ -152,9 +153,11 @@ impl BlockState {
         mut probe: Option<&mut dyn Probe>,
     ) -> Result<()> {
         if plan.hold == Hold::No {
-            self.prepare(exec, engine, options, plan, &mut probe)?;
+            listen(exec, engine, &mut self.ears());
+            self.prepare(engine, options, plan, &mut probe)?;
             self.sample(exec, engine, options, plan, &mut probe);
-            self.complete(exec, engine, options, plan, &mut probe)?;
+            self.decode(exec, engine, options, plan, &mut probe);
+            self.pose(Some(exec.pool_mut()), engine)?;
         } else {
             self.hold(exec, engine, plan)?;
         }
@@ -185,10 +188,14 @@ impl BlockState {
         Ok(())
     }
 
-    /// Makes the conditioning of the next block.
+    /// The voices, to listen for the next block.
+    pub(super) fn ears(&mut self) -> [Listening<'_>; 2] {
+        self.inputs.ears(self.block)
+    }
+
+    /// Makes the conditioning of the next block, for which voices have listened.
     pub(super) fn prepare(
         &mut self,
-        exec: &mut Exec,
         engine: &Engine,
         options: &SessionOptions,
         plan: &Plan,
@@ -196,7 +203,7 @@ impl BlockState {
     ) -> Result<()> {
         let config = engine.config.gaze.as_ref();
         let gaze = options.gaze_control.cue(config, options.gaze, plan.sampler, options.seed, self.block);
-        self.inputs.prepare(exec, engine, self.block, &self.motion.root(), gaze, probe)
+        self.inputs.prepare(self.block, &self.motion.root(), gaze, probe)
     }
 
     /// Makes the latent.
@@ -230,15 +237,15 @@ impl BlockState {
         });
     }
 
-    /// Makes frames of the latent that the generator made last.
-    pub(super) fn complete(
+    /// Makes features of the latent that the generator made last.
+    pub(super) fn decode(
         &mut self,
         exec: &mut Exec,
         engine: &Engine,
         options: &SessionOptions,
         plan: &Plan,
         probe: &mut Option<&mut dyn Probe>,
-    ) -> Result<()> {
+    ) {
         let (block, root) = (self.block, self.motion.root());
         let token = self.generator.history().len() - 1;
         self.latent.copy_from_slice(self.generator.history().z(token));
@@ -276,10 +283,13 @@ impl BlockState {
                 self.generator.catch_up(exec, engine.nets(), sampler);
             }
         }
+    }
 
+    /// Makes frames of the features, on the threads of `pool` if there is one.
+    pub(super) fn pose(&mut self, pool: Option<&mut Pool>, engine: &Engine) -> Result<()> {
         engine.pose.restore(&mut self.features);
         let before = self.motion.guard_stats();
-        self.motion.decode_block(&self.features, &mut self.frames)?;
+        self.motion.decode_block_on(pool, &self.features, &mut self.frames)?;
         if self.frames.iter().any(|frame| frame.held > 0.0) {
             // The history must hold what was shown.
             self.motion.shown(&mut self.features);

@@ -1,7 +1,9 @@
 //! Several sessions stepped together: their rows share each pass over the flow network's weights.
 
 use super::Session;
+use super::block::BlockState;
 use super::governor::{Hold, Plan};
+use super::inputs::listen;
 use crate::engine::Engine;
 use crate::error::{Error, ErrorKind, Result};
 use crate::flow::{SHARED_ROWS, SharedPass};
@@ -127,16 +129,26 @@ impl Team {
             }
             fine
         };
-        let alone = members.iter().flatten().count() == 1;
+        let count = members.iter().flatten().count();
+        for (session, _) in members.iter_mut().flatten() {
+            session.done = session.due.take();
+        }
+        if count == 1 {
+            for (session, _) in members.iter_mut().flatten() {
+                let Session { state, options, done: Some(due), .. } = &mut **session else { continue };
+                keep(state.compute(exec, engine, options, &due.plan, None));
+            }
+            return outcome;
+        }
+        let mut ears = [const { [const { None }; 2] }; MEMBERS];
+        for (ears, (session, _)) in ears.iter_mut().zip(members.iter_mut().flatten()) {
+            *ears = session.state.ears();
+        }
+        listen(exec, engine, &mut ears.as_flattened_mut()[..2 * count]);
         for member in &mut members {
             let Some((session, _)) = member else { continue };
-            let Some(due) = session.due.take() else { continue };
-            session.done = Some(due);
-            let Session { state, options, .. } = &mut **session;
-            if alone {
-                keep(state.compute(exec, engine, options, &due.plan, None));
-                *member = None;
-            } else if keep(state.prepare(exec, engine, options, &due.plan, &mut None)) {
+            let Session { state, options, done: Some(due), .. } = &mut **session else { continue };
+            if keep(state.prepare(engine, options, &due.plan, &mut None)) {
                 state.begin_shared(engine, options, &due.plan);
             } else {
                 *member = None;
@@ -144,15 +156,31 @@ impl Team {
         }
         pass.sample(exec, engine.nets(), &mut members, |member| &mut member.0.state.generator);
         *shared += members.iter().flatten().count() as u64;
-        for (session, _) in members.iter_mut().flatten() {
-            let Session { state, options, done, .. } = &mut **session;
-            let Some(Due { plan, .. }) = done else { continue };
-            if keep(state.complete(exec, engine, options, plan, &mut None)) {
+        let mut posing: [Option<Posing<'_>>; MEMBERS] = [const { None }; MEMBERS];
+        for (posing, (session, _)) in posing.iter_mut().zip(members.iter_mut().flatten()) {
+            let Session { state, options, done: Some(due), .. } = &mut **session else { continue };
+            state.decode(exec, engine, options, &due.plan, &mut None);
+            *posing = Some(Posing { state, plan: &due.plan, done: Ok(()) });
+        }
+        exec.pool_mut().each(&mut posing[..count], |_, posing| {
+            let Some(Posing { state, plan, done }) = posing else { return };
+            *done = state.pose(None, engine);
+            if done.is_ok() {
                 state.present(engine, plan, &mut None);
             }
+        });
+        for posing in posing.into_iter().flatten() {
+            keep(posing.done);
         }
         outcome
     }
+}
+
+/// A session whose features are to become frames.
+struct Posing<'a> {
+    state: &'a mut BlockState,
+    plan: &'a Plan,
+    done: Result<()>,
 }
 
 /// The first session that is due, and those that can share its passes; `None` when all are done.
