@@ -12,7 +12,7 @@ use crate::frame::{BLOCK_FRAMES, FPS, Frame, Sampler};
 use crate::kernels::Exec;
 use crate::par::Pool;
 use crate::pose::{self, gaze_score};
-use crate::vae::DecoderState;
+use crate::vae::{DecoderState, Decoding};
 
 /// Standardised latents are of unit scale; what is this far out, or not a number, is no latent.
 const MAX_LATENT: f32 = 1000.0;
@@ -38,6 +38,8 @@ pub(super) struct BlockState {
     pub(super) noise: Noise,
     /// The latent, unstandardised.
     latent: Vec<f32>,
+    /// Whether it was one.
+    usable: bool,
     /// Four frames of features; standardised, then not.
     features: Vec<f32>,
     pub(super) frames: Vec<Frame>,
@@ -81,6 +83,7 @@ impl BlockState {
             head: rig.index("head").unwrap_or(0),
             noise: Noise::Seeded,
             latent: vec![0.0; engine.config.vae.latent],
+            usable: true,
             features: vec![0.0; BLOCK_FRAMES * engine.features()],
             frames: (0..BLOCK_FRAMES).map(|_| Frame::empty(rig.joints.len())).collect(),
             block: 0,
@@ -238,7 +241,47 @@ impl BlockState {
     }
 
     /// Makes features of the latent that the generator made last.
-    pub(super) fn decode(
+    fn decode(
+        &mut self,
+        exec: &mut Exec,
+        engine: &Engine,
+        options: &SessionOptions,
+        plan: &Plan,
+        probe: &mut Option<&mut dyn Probe>,
+    ) {
+        self.take_latent(engine, options, probe);
+        engine.decoder.step(exec, &mut self.decoder, &self.latent, &mut self.features);
+        self.decoded(exec, engine, options, plan, probe);
+    }
+
+    /// Takes the latent that the generator made last, for [`BlockState::decoding`].
+    pub(super) fn take_latent(
+        &mut self,
+        engine: &Engine,
+        options: &SessionOptions,
+        probe: &mut Option<&mut dyn Probe>,
+    ) {
+        let token = self.generator.history().len() - 1;
+        self.latent.copy_from_slice(self.generator.history().z(token));
+        tell(probe, self.block, "latents", &self.latent);
+
+        self.usable = !options.guard || self.latent.iter().all(|z| z.abs() < MAX_LATENT);
+        if !self.usable {
+            // Nothing of the kind may stay in the history or in a cache.
+            self.latent.fill(0.0);
+            self.generator.history_mut().replace(token, &self.latent);
+            self.generator.forget();
+        }
+        engine.latent.restore(&mut self.latent);
+    }
+
+    /// The decoder's part of the block: features of the latent.
+    pub(super) fn decoding(&mut self) -> Decoding<'_> {
+        Decoding { state: &mut self.decoder, z: &self.latent, out: &mut self.features }
+    }
+
+    /// What follows the decoder: re-anchoring and catching up.
+    pub(super) fn decoded(
         &mut self,
         exec: &mut Exec,
         engine: &Engine,
@@ -247,23 +290,10 @@ impl BlockState {
         probe: &mut Option<&mut dyn Probe>,
     ) {
         let (block, root) = (self.block, self.motion.root());
-        let token = self.generator.history().len() - 1;
-        self.latent.copy_from_slice(self.generator.history().z(token));
-        tell(probe, block, "latents", &self.latent);
-
-        let usable = !options.guard || self.latent.iter().all(|z| z.abs() < MAX_LATENT);
-        if !usable {
-            // Nothing of the kind may stay in the history or in a cache.
-            self.latent.fill(0.0);
-            self.generator.history_mut().replace(token, &self.latent);
-            self.generator.forget();
-        }
-        engine.latent.restore(&mut self.latent);
-        engine.decoder.step(exec, &mut self.decoder, &self.latent, &mut self.features);
         if options.guard && !finite(&self.features) {
             self.decoder.reset(block);
         }
-        if !usable {
+        if !self.usable {
             // The guard holds a pose for it.
             self.features.fill(f32::NAN);
         }

@@ -8,6 +8,7 @@ use crate::engine::Engine;
 use crate::error::{Error, ErrorKind, Result};
 use crate::flow::{SHARED_ROWS, SharedPass};
 use crate::kernels::Exec;
+use crate::vae::{Decoding, SharedDecoding};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -17,7 +18,7 @@ const MEMBERS: usize = SHARED_ROWS / 2;
 /// What it takes to step several sessions of one engine together: threads and working memory.
 ///
 /// Reading the weights is most of a block's time. Sessions whose blocks are due at the same time, and made by the same
-/// sampler with history at the same flow times, go through the flow network side by side, up to 16 rows a pass: four without a gaze target, two with
+/// sampler with history at the same flow times, go through the flow network and the decoder side by side, in the flow network up to 16 rows a pass: four without a gaze target, two with
 /// one, eight on the single-step student. The others are computed one after the other. What each session shows has the bits that
 /// [`Session::poll`] gives.
 ///
@@ -45,6 +46,7 @@ pub struct Team {
     engine: Arc<Engine>,
     exec: Exec,
     pass: SharedPass,
+    decoder: SharedDecoding,
     shared: u64,
 }
 
@@ -62,7 +64,8 @@ impl Team {
     pub(crate) fn new(engine: Arc<Engine>, threads: usize) -> Result<Self> {
         let exec = engine.exec(threads)?;
         let pass = SharedPass::new(engine.nets());
-        Ok(Self { engine, exec, pass, shared: 0 })
+        let decoder = engine.decoder.shared(MEMBERS);
+        Ok(Self { engine, exec, pass, decoder, shared: 0 })
     }
 
     /// Blocks so far that shared their passes with another session's.
@@ -120,7 +123,7 @@ impl Team {
     /// One block of each of `members`, which can share passes. Allocates nothing, takes no lock, makes no system call.
     #[cfg_attr(visavis_rtsan, sanitize(realtime = "nonblocking"))]
     fn block(&mut self, mut members: [Option<Member<'_, '_>>; MEMBERS]) -> Result<()> {
-        let Self { engine, exec, pass, shared } = self;
+        let Self { engine, exec, pass, decoder, shared } = self;
         let mut outcome = Ok(());
         let mut keep = |done: Result<()>| {
             let fine = done.is_ok();
@@ -156,10 +159,17 @@ impl Team {
         }
         pass.sample(exec, engine.nets(), &mut members, |member| &mut member.0.state.generator);
         *shared += members.iter().flatten().count() as u64;
+        let mut decoding: [Option<Decoding<'_>>; MEMBERS] = [const { None }; MEMBERS];
+        for (decoding, (session, _)) in decoding.iter_mut().zip(members.iter_mut().flatten()) {
+            let Session { state, options, .. } = &mut **session;
+            state.take_latent(engine, options, &mut None);
+            *decoding = Some(state.decoding());
+        }
+        engine.decoder.step_all(exec, decoder, &mut decoding);
         let mut posing: [Option<Posing<'_>>; MEMBERS] = [const { None }; MEMBERS];
         for (posing, (session, _)) in posing.iter_mut().zip(members.iter_mut().flatten()) {
             let Session { state, options, done: Some(due), .. } = &mut **session else { continue };
-            state.decode(exec, engine, options, &due.plan, &mut None);
+            state.decoded(exec, engine, options, &due.plan, &mut None);
             *posing = Some(Posing { state, plan: &due.plan, done: Ok(()) });
         }
         exec.pool_mut().each(&mut posing[..count], |_, posing| {
