@@ -309,12 +309,14 @@ impl Engine {
     pub(crate) fn exec(&self, threads: usize) -> Result<Exec> {
         let c = &self.config;
         let (rows, audio) = AudioEncoder::limits(&c.audio);
+        let rows = rows.max(32);
         let flow =
             [c.flow.width * c.flow.mlp.max(6), c.flow.embed_user + 2 * c.flow.embed_voice + c.flow.embed_gaze + 4];
         let rest =
             [c.vae.width * c.vae.mlp.max(3), self.features(), 4 * c.audio.features, c.vae.latent, c.flow.tau_width];
         let width = flow.into_iter().chain(rest).fold(audio, usize::max);
-        Exec::new(self.kernels, threads, Limits { rows: rows.max(32), width })
+        // Voices are what is shared out whole.
+        Exec::new(self.kernels, threads, Limits { rows, width })?.with_lanes(Limits { rows, width: audio })
     }
 }
 

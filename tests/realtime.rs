@@ -120,7 +120,14 @@ fn a_running_session_does_not_allocate() {
             .map(|seed| {
                 let gaze = (seed == 1).then_some(0.5);
                 let options = SessionOptions { seed, gaze, anchoring: Anchoring::Every(10), ..Default::default() };
-                engine.session(options).unwrap()
+                let mut session = engine.session(options).unwrap();
+                // Of some, both voices are heard, of some, one.
+                let second = inputs.rate as usize;
+                session.push_agent_audio(&inputs.agent[..6 * second], inputs.rate).unwrap();
+                if seed % 2 == 0 {
+                    session.push_user_audio(&inputs.user[..6 * second], inputs.rate).unwrap();
+                }
+                session
             })
             .collect();
         let mut due: Vec<_> = sessions.iter_mut().map(|session| (session, 0.0)).collect();

@@ -60,6 +60,8 @@ pub struct Exec {
     pub(super) upcoming: Option<[Onward; 2]>,
     flush: Option<FlushToZero>,
     pub(super) activations: Option<Activations>,
+    /// What each thread has to itself while things are shared out whole.
+    pub(super) lanes: Option<Box<[Exec; 2]>>,
 }
 
 /// A pointer that the pieces of one run share; each writes a part of its own.
@@ -103,6 +105,7 @@ impl Exec {
             upcoming: None,
             flush: None,
             activations: None,
+            lanes: None,
         })
     }
 

@@ -56,6 +56,7 @@ mod exec_tests;
 mod fold;
 mod gelu;
 mod interleave;
+mod lanes;
 mod level;
 mod linear;
 mod math;

@@ -1,6 +1,7 @@
 //! Feature vectors to world transforms and back.
 
 use super::bridge::Bridge;
+use super::fit::follow;
 use super::guard::{Guard, GuardStats};
 use super::icosahedron::{decode, encode};
 use super::stance::Stance;
@@ -8,7 +9,11 @@ use super::{Fit, Rig};
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{BLOCK_FRAMES, Frame, JOINT_CHANNELS, ROOT_CHANNELS, Root, Transform};
 use crate::kernels::Kernels;
+use crate::par::Pool;
 use glam::{Mat3, Quat, Vec3};
+
+/// Joints that one thread makes transforms of at a time: as many as go through the polar factors side by side, twice.
+const LOT: usize = 32;
 
 /// Length F of the feature vector of `joints` joints: `3 + 36 joints`.
 pub const fn feature_count(joints: usize) -> usize {
@@ -43,12 +48,13 @@ pub struct Decoder {
     /// Whether poses are judged; else the guard only holds.
     guarded: bool,
     kernels: Kernels,
-    /// Joints of a block's frames, each frame's in its heading frame, `[4, J]`.
+    /// Joints of a block's frames, each frame's in its heading frame, `[4, J]`, and a rest up to whole lots.
     joints: Vec<Transform>,
-    /// The root's step to each of them.
+    /// The root's step to each of them, and the root.
     steps: [[f32; ROOT_CHANNELS]; BLOCK_FRAMES],
-    maps: Vec<[f32; 9]>,
-    rotations: Vec<[f32; 9]>,
+    roots: [Root; BLOCK_FRAMES],
+    /// Scratch of the fit, for each of two threads.
+    placed: [Vec<Transform>; 2],
     /// World rotations of the frame before, for the signs of the quaternions.
     previous: Vec<Quat>,
 }
@@ -66,10 +72,10 @@ impl Decoder {
             guard: Guard::new(rig),
             guarded: false,
             kernels,
-            joints: vec![Transform::IDENTITY; BLOCK_FRAMES * n],
+            joints: vec![Transform::IDENTITY; (BLOCK_FRAMES * n).next_multiple_of(LOT)],
             steps: [[0.0; ROOT_CHANNELS]; BLOCK_FRAMES],
-            maps: vec![[0.0; 9]; BLOCK_FRAMES * n],
-            rotations: vec![[0.0; 9]; BLOCK_FRAMES * n],
+            roots: [Root::default(); BLOCK_FRAMES],
+            placed: [(); 2].map(|()| vec![Transform::IDENTITY; n]),
             previous: vec![Quat::IDENTITY; n],
         }
     }
@@ -127,7 +133,7 @@ impl Decoder {
     /// If `x` is not F long.
     pub fn prime(&mut self, x: &[f32]) {
         assert_eq!(x.len(), self.feature_count(), "a feature vector has 3 + 36 J values");
-        self.transforms(x);
+        self.transforms(None, x);
         self.guard.prime(&self.joints[..self.previous.len()]);
     }
 
@@ -154,6 +160,18 @@ impl Decoder {
     /// # Panics
     /// If there are more than four frames, or `x` does not have as many vectors of length F.
     pub fn decode_block(&mut self, x: &[f32], frames: &mut [Frame]) -> Result<()> {
+        self.decode_block_on(None, x, frames)
+    }
+
+    /// The same on the threads of `pool`, as far as frames do not depend on each other; with the same bits.
+    ///
+    /// # Errors
+    /// As [`Decoder::decode_block`].
+    ///
+    /// # Panics
+    /// As [`Decoder::decode_block`].
+    pub fn decode_block_on(&mut self, pool: Option<&mut Pool>, x: &[f32], frames: &mut [Frame]) -> Result<()> {
+        let mut pool = pool;
         let (n, width) = (self.previous.len(), self.feature_count());
         assert!(frames.len() <= BLOCK_FRAMES, "a block has at most four frames");
         assert_eq!(x.len(), width * frames.len(), "a feature vector has 3 + 36 J values");
@@ -163,13 +181,13 @@ impl Decoder {
                 "the model gave a pose that is not finite; reset the session, and check the bundle if it happens again",
             ));
         }
-        self.transforms(x);
+        self.transforms(pool.as_deref_mut(), x);
         for (i, frame) in frames.iter_mut().enumerate() {
             self.steps[i] = [0, 1, 2].map(|c| x[i * width + c]);
             let joints = &mut self.joints[i * n..(i + 1) * n];
             frame.held = if self.guarded { self.guard.check(joints, &mut self.steps[i]) } else { 0.0 };
         }
-        self.show(frames);
+        self.show(pool, frames);
         Ok(())
     }
 
@@ -184,11 +202,11 @@ impl Decoder {
             self.guard.hold(&mut self.joints[i * n..(i + 1) * n], &mut self.steps[i]);
             frame.held = 1.0;
         }
-        self.show(frames);
+        self.show(None, frames);
     }
 
     /// Makes `frames` of `joints` and `steps`.
-    fn show(&mut self, frames: &mut [Frame]) {
+    fn show(&mut self, pool: Option<&mut Pool>, frames: &mut [Frame]) {
         let n = self.previous.len();
         if let Some(bridge) = &mut self.bridge
             && !frames.is_empty()
@@ -196,7 +214,7 @@ impl Decoder {
             let second = (frames.len() > 1).then(|| &self.joints[n..2 * n]);
             bridge.start(&self.joints[..n], second, self.steps[0]);
         }
-        for (i, (frame, step)) in frames.iter_mut().zip(&mut self.steps).enumerate() {
+        for (i, step) in self.steps[..frames.len()].iter_mut().enumerate() {
             let joints = &mut self.joints[i * n..(i + 1) * n];
             if let Some(bridge) = &mut self.bridge {
                 bridge.apply(joints, step);
@@ -206,8 +224,18 @@ impl Decoder {
             }
             let [vx, vz, dyaw] = *step;
             self.root = self.root.advanced(vx, vz, dyaw);
-            place(joints, &self.root, &mut self.previous, frame);
-            self.fit.fit(joints, &self.root, frame);
+            self.roots[i] = self.root;
+        }
+        let Self { joints, roots, fit, placed, .. } = &mut *self;
+        let fit = &*fit;
+        each(pool, placed, frames, |placed, i, frame| {
+            let joints = &joints[i * n..(i + 1) * n];
+            place(joints, &roots[i], frame);
+            fit.turn(placed, joints, &roots[i], frame);
+        });
+        for frame in frames {
+            follow(&mut self.previous, frame.global.iter_mut().map(|joint| &mut joint.rotation));
+            self.fit.sign(frame);
         }
     }
 
@@ -231,32 +259,49 @@ impl Decoder {
     }
 
     /// Fills the first of `joints` from the feature vectors in `x`.
-    fn transforms(&mut self, x: &[f32]) {
-        let n = self.previous.len();
-        let count = x.len() / self.feature_count() * n;
-        let (joints, maps) = (&mut self.joints[..count], &mut self.maps[..count]);
-        let vectors = x.chunks_exact(feature_count(n));
-        let vertices = vectors.flat_map(|x| x[ROOT_CHANNELS..].as_chunks::<JOINT_CHANNELS>().0);
-        for ((joint, map), vertices) in joints.iter_mut().zip(&mut *maps).zip(vertices) {
-            (joint.position, *map) = decode(vertices, self.radius);
-        }
-        self.kernels.polar(maps, &mut self.rotations[..count]);
-        for (joint, r) in joints.iter_mut().zip(&self.rotations) {
-            joint.rotation = Quat::from_mat3(&Mat3::from_cols_array(r).transpose()).normalize();
-        }
+    fn transforms(&mut self, pool: Option<&mut Pool>, x: &[f32]) {
+        let (n, width) = (self.previous.len(), self.feature_count());
+        let count = x.len() / width * n;
+        let (kernels, radius) = (self.kernels, self.radius);
+        let lots = &mut self.joints.as_chunks_mut::<LOT>().0[..count.div_ceil(LOT)];
+        each(pool, &mut [(), ()], lots, |(), lot, joints| {
+            let first = lot * LOT;
+            let joints = &mut joints[..LOT.min(count - first)];
+            let (mut maps, mut rotations) = ([[0.0; 9]; LOT], [[0.0; 9]; LOT]);
+            for (i, (joint, map)) in joints.iter_mut().zip(&mut maps).enumerate() {
+                let (frame, j) = ((first + i) / n, (first + i) % n);
+                let vertices = x[frame * width + ROOT_CHANNELS..][..n * JOINT_CHANNELS].as_chunks().0;
+                (joint.position, *map) = decode(&vertices[j], radius);
+            }
+            kernels.polar(&maps[..joints.len()], &mut rotations[..joints.len()]);
+            for (joint, r) in joints.iter_mut().zip(&rotations) {
+                joint.rotation = Quat::from_mat3(&Mat3::from_cols_array(r).transpose()).normalize();
+            }
+        });
     }
 }
 
-/// Writes `joints`, in the heading frame of `root`, to `frame` as world transforms; `previous` keeps their signs.
-fn place(joints: &[Transform], root: &Root, previous: &mut [Quat], frame: &mut Frame) {
+/// Calls `work` for each of `items` with one of the `tools`, on the threads of `pool` if there is one.
+fn each<S: Send, T: Send>(
+    pool: Option<&mut Pool>,
+    tools: &mut [S; 2],
+    items: &mut [T],
+    work: impl Fn(&mut S, usize, &mut T) + Sync,
+) {
+    match pool {
+        Some(pool) => pool.each_with(tools, items, work),
+        None => items.iter_mut().enumerate().for_each(|(i, item)| work(&mut tools[0], i, item)),
+    }
+}
+
+/// Writes `joints`, in the heading frame of `root`, to `frame` as world transforms, but for the signs of the rotations.
+fn place(joints: &[Transform], root: &Root, frame: &mut Frame) {
     let heading = root.rotation();
     frame.root = *root;
     frame.global.resize(joints.len(), Transform::IDENTITY);
-    for ((world, joint), previous) in frame.global.iter_mut().zip(joints).zip(previous) {
-        let q = (heading * joint.rotation).normalize();
-        let rotation = if q.dot(*previous) < 0.0 { -q } else { q };
+    for (world, joint) in frame.global.iter_mut().zip(joints) {
+        let rotation = (heading * joint.rotation).normalize();
         *world = Transform { position: root.to_world(joint.position), rotation };
-        *previous = rotation;
     }
 }
 
@@ -322,6 +367,35 @@ mod tests {
             x
         };
         frames.iter().map(encode).collect()
+    }
+
+    #[test]
+    fn with_and_without_a_pool_are_the_same_bits() {
+        let recording = synthetic::walk(160);
+        let (n, width) = (recording.rig.len(), feature_count(recording.rig.len()));
+        let mut x = features(&recording.frames).concat();
+        // A frame that no body can show, and joints off their bones.
+        x[70 * width..71 * width].fill(f32::NAN);
+        x.iter_mut().enumerate().for_each(|(i, v)| *v += 0.01 * (i as f32 * 0.7).sin());
+        let decoder = || {
+            let decoder = Decoder::new(Kernels::detect().unwrap(), &recording.rig, RADIUS);
+            decoder.with_bridge(&recording.rig, 0.8).with_stance(&recording.rig).with_guard()
+        };
+        let (mut alone, mut pool) = (decoder(), Pool::new(2).unwrap());
+        let mut shared = decoder();
+        pool.begin();
+        for (block, x) in x.chunks(BLOCK_FRAMES * width).enumerate() {
+            // Blocks of all sizes up to four frames.
+            for x in x.chunks((1 + block % BLOCK_FRAMES) * width) {
+                let mut expected = vec![Frame::empty(n); x.len() / width];
+                let mut frames = expected.clone();
+                alone.decode_block(x, &mut expected).unwrap();
+                shared.decode_block_on(Some(&mut pool), x, &mut frames).unwrap();
+                assert_eq!(frames, expected, "block {block}");
+            }
+        }
+        pool.end();
+        assert!(alone.guard_stats().trips > 0);
     }
 
     #[test]

@@ -73,6 +73,14 @@ impl Fit {
     /// # Panics
     /// If `joints` is not J long.
     pub fn fit(&mut self, joints: &[Transform], root: &Root, frame: &mut Frame) {
+        let mut placed = std::mem::take(&mut self.placed);
+        self.turn(&mut placed, joints, root, frame);
+        self.placed = placed;
+        self.sign(frame);
+    }
+
+    /// What [`Fit::fit`] does but for signs, which depend on the frame before. `placed` is scratch for J transforms.
+    pub(super) fn turn(&self, placed: &mut [Transform], joints: &[Transform], root: &Root, frame: &mut Frame) {
         assert_eq!(joints.len(), self.plans.len(), "one transform a joint");
         frame.local.resize(joints.len(), Quat::IDENTITY);
         frame.hips = root.to_world(joints[0].position);
@@ -81,17 +89,20 @@ impl Fit {
             let (position, parent) = match self.parents[j] {
                 None => (joints[0].position, root.rotation().inverse()),
                 Some(p) => {
-                    let Transform { position, rotation } = self.placed[p];
+                    let Transform { position, rotation } = placed[p];
                     (position + rotation * self.offsets[j], rotation)
                 }
             };
             let rotation = self.rotation(j, position, joints);
-            self.placed[j] = Transform { position, rotation };
+            placed[j] = Transform { position, rotation };
             frame.fit_error = frame.fit_error.max(position.distance(joints[j].position));
-            let q = (parent.inverse() * rotation).normalize();
-            let q = if q.dot(self.previous[j]) < 0.0 { -q } else { q };
-            (frame.local[j], self.previous[j]) = (q, q);
+            frame.local[j] = (parent.inverse() * rotation).normalize();
         }
+    }
+
+    /// Gives the rotations of `frame` the signs of the frame before.
+    pub(super) fn sign(&mut self, frame: &mut Frame) {
+        follow(&mut self.previous, frame.local.iter_mut());
     }
 
     /// Rotation of joint `j`, fitted at `at`, in the frame of `joints`.
@@ -136,6 +147,14 @@ fn plan(rig: &Rig, j: usize) -> Plan {
             Some(end) if limb => Plan::Limb { middle: child, end },
             _ => Plan::Single { child },
         },
+    }
+}
+
+/// Gives each of `rotations` the sign that is nearer to its rotation in `previous`, which it replaces.
+pub(super) fn follow<'a>(previous: &mut [Quat], rotations: impl Iterator<Item = &'a mut Quat>) {
+    for (q, previous) in rotations.zip(previous) {
+        *q = if q.dot(*previous) < 0.0 { -*q } else { *q };
+        *previous = *q;
     }
 }
 

@@ -3,15 +3,16 @@
 use super::SessionOptions;
 use super::anchor::Anchor;
 use super::governor::{Hold, Outlook, Plan, Work};
-use super::inputs::Inputs;
+use super::inputs::{Inputs, Listening, listen};
 use super::probe::{Probe, tell};
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::flow::{Condition, Generator, GeneratorOptions, SharedPass, normal};
 use crate::frame::{BLOCK_FRAMES, FPS, Frame, Sampler};
 use crate::kernels::Exec;
+use crate::par::Pool;
 use crate::pose::{self, gaze_score};
-use crate::vae::DecoderState;
+use crate::vae::{DecoderState, Decoding};
 
 /// Standardised latents are of unit scale; what is this far out, or not a number, is no latent.
 const MAX_LATENT: f32 = 1000.0;
@@ -37,6 +38,8 @@ pub(super) struct BlockState {
     pub(super) noise: Noise,
     /// The latent, unstandardised.
     latent: Vec<f32>,
+    /// Whether it was one.
+    usable: bool,
     /// Four frames of features; standardised, then not.
     features: Vec<f32>,
     pub(super) frames: Vec<Frame>,
@@ -80,6 +83,7 @@ impl BlockState {
             head: rig.index("head").unwrap_or(0),
             noise: Noise::Seeded,
             latent: vec![0.0; engine.config.vae.latent],
+            usable: true,
             features: vec![0.0; BLOCK_FRAMES * engine.features()],
             frames: (0..BLOCK_FRAMES).map(|_| Frame::empty(rig.joints.len())).collect(),
             block: 0,
@@ -152,9 +156,11 @@ impl BlockState {
         mut probe: Option<&mut dyn Probe>,
     ) -> Result<()> {
         if plan.hold == Hold::No {
-            self.prepare(exec, engine, options, plan, &mut probe)?;
+            listen(exec, engine, &mut self.ears());
+            self.prepare(engine, options, plan, &mut probe)?;
             self.sample(exec, engine, options, plan, &mut probe);
-            self.complete(exec, engine, options, plan, &mut probe)?;
+            self.decode(exec, engine, options, plan, &mut probe);
+            self.pose(Some(exec.pool_mut()), engine)?;
         } else {
             self.hold(exec, engine, plan)?;
         }
@@ -185,10 +191,14 @@ impl BlockState {
         Ok(())
     }
 
-    /// Makes the conditioning of the next block.
+    /// The voices, to listen for the next block.
+    pub(super) fn ears(&mut self) -> [Listening<'_>; 2] {
+        self.inputs.ears(self.block)
+    }
+
+    /// Makes the conditioning of the next block, for which voices have listened.
     pub(super) fn prepare(
         &mut self,
-        exec: &mut Exec,
         engine: &Engine,
         options: &SessionOptions,
         plan: &Plan,
@@ -196,7 +206,7 @@ impl BlockState {
     ) -> Result<()> {
         let config = engine.config.gaze.as_ref();
         let gaze = options.gaze_control.cue(config, options.gaze, plan.sampler, options.seed, self.block);
-        self.inputs.prepare(exec, engine, self.block, &self.motion.root(), gaze, probe)
+        self.inputs.prepare(self.block, &self.motion.root(), gaze, probe)
     }
 
     /// Makes the latent.
@@ -230,33 +240,60 @@ impl BlockState {
         });
     }
 
-    /// Makes frames of the latent that the generator made last.
-    pub(super) fn complete(
+    /// Makes features of the latent that the generator made last.
+    fn decode(
         &mut self,
         exec: &mut Exec,
         engine: &Engine,
         options: &SessionOptions,
         plan: &Plan,
         probe: &mut Option<&mut dyn Probe>,
-    ) -> Result<()> {
-        let (block, root) = (self.block, self.motion.root());
+    ) {
+        self.take_latent(engine, options, probe);
+        engine.decoder.step(exec, &mut self.decoder, &self.latent, &mut self.features);
+        self.decoded(exec, engine, options, plan, probe);
+    }
+
+    /// Takes the latent that the generator made last, for [`BlockState::decoding`].
+    pub(super) fn take_latent(
+        &mut self,
+        engine: &Engine,
+        options: &SessionOptions,
+        probe: &mut Option<&mut dyn Probe>,
+    ) {
         let token = self.generator.history().len() - 1;
         self.latent.copy_from_slice(self.generator.history().z(token));
-        tell(probe, block, "latents", &self.latent);
+        tell(probe, self.block, "latents", &self.latent);
 
-        let usable = !options.guard || self.latent.iter().all(|z| z.abs() < MAX_LATENT);
-        if !usable {
+        self.usable = !options.guard || self.latent.iter().all(|z| z.abs() < MAX_LATENT);
+        if !self.usable {
             // Nothing of the kind may stay in the history or in a cache.
             self.latent.fill(0.0);
             self.generator.history_mut().replace(token, &self.latent);
             self.generator.forget();
         }
         engine.latent.restore(&mut self.latent);
-        engine.decoder.step(exec, &mut self.decoder, &self.latent, &mut self.features);
+    }
+
+    /// The decoder's part of the block: features of the latent.
+    pub(super) fn decoding(&mut self) -> Decoding<'_> {
+        Decoding { state: &mut self.decoder, z: &self.latent, out: &mut self.features }
+    }
+
+    /// What follows the decoder: re-anchoring and catching up.
+    pub(super) fn decoded(
+        &mut self,
+        exec: &mut Exec,
+        engine: &Engine,
+        options: &SessionOptions,
+        plan: &Plan,
+        probe: &mut Option<&mut dyn Probe>,
+    ) {
+        let (block, root) = (self.block, self.motion.root());
         if options.guard && !finite(&self.features) {
             self.decoder.reset(block);
         }
-        if !usable {
+        if !self.usable {
             // The guard holds a pose for it.
             self.features.fill(f32::NAN);
         }
@@ -276,10 +313,13 @@ impl BlockState {
                 self.generator.catch_up(exec, engine.nets(), sampler);
             }
         }
+    }
 
+    /// Makes frames of the features, on the threads of `pool` if there is one.
+    pub(super) fn pose(&mut self, pool: Option<&mut Pool>, engine: &Engine) -> Result<()> {
         engine.pose.restore(&mut self.features);
         let before = self.motion.guard_stats();
-        self.motion.decode_block(&self.features, &mut self.frames)?;
+        self.motion.decode_block_on(pool, &self.features, &mut self.frames)?;
         if self.frames.iter().any(|frame| frame.held > 0.0) {
             // The history must hold what was shown.
             self.motion.shown(&mut self.features);

@@ -17,10 +17,13 @@ use crate::user::{HeadTrack, Presence, UserSample};
 use glam::Vec3;
 
 /// A voice and the encoder that listens to it.
-struct Ear {
+pub(super) struct Ear {
     voice: Voice,
     encoder: Hearing,
+    samples: Box<[f32; BLOCK_SAMPLES]>,
     features: Vec<f32>,
+    /// Whether `features` are those of the next block.
+    heard: Result<bool>,
     /// Blocks by which it lags.
     delay: u64,
     /// The session's first block.
@@ -70,7 +73,6 @@ pub(super) struct Inputs {
     user: Ear,
     track: HeadTrack,
     user_delay: u64,
-    samples: Box<[f32; BLOCK_SAMPLES]>,
     pub(super) condition: Condition,
 }
 
@@ -79,7 +81,9 @@ impl Ear {
         Ok(Self {
             voice: Voice::new(),
             encoder: Hearing::new(engine, options.audio)?,
+            samples: Box::new([0.0; BLOCK_SAMPLES]),
             features: vec![0.0; BLOCK_FRAMES * engine.config.audio.features],
+            heard: Ok(false),
             delay: u64::from(delay),
             first: 0,
             open: false,
@@ -88,39 +92,59 @@ impl Ear {
 
     fn reset(&mut self, first: u64) {
         self.voice.reset_at(first);
-        (self.first, self.open) = (first, false);
+        (self.first, self.open, self.heard) = (first, false, Ok(false));
     }
 
     /// The block whose sound `block` may know, unless that was before the session's start.
-    fn heard(&self, block: u64) -> Option<u64> {
-        block.checked_sub(self.delay).filter(|heard| *heard >= self.first)
+    fn known(&self, block: u64) -> Option<u64> {
+        block.checked_sub(self.delay).filter(|known| *known >= self.first)
     }
 
     /// Lets the sound that `block` may know go by unheard; the next that is heard starts a new signal.
-    fn skip(&mut self, block: u64, samples: &mut [f32; BLOCK_SAMPLES]) -> Result<()> {
+    fn skip(&mut self, block: u64) -> Result<()> {
         self.open = false;
-        self.heard(block).map_or(Ok(()), |heard| self.voice.take_block(heard, samples).map(drop))
+        self.known(block).map_or(Ok(()), |known| self.voice.take_block(known, &mut self.samples).map(drop))
     }
 
-    /// Features of the sound that `block` may know, or `None` where there is none.
-    fn listen(
-        &mut self,
-        exec: &mut Exec,
-        engine: &Engine,
-        block: u64,
-        samples: &mut [f32; BLOCK_SAMPLES],
-    ) -> Result<Option<&[f32]>> {
-        let Some(heard) = self.heard(block) else { return Ok(None) };
-        if !self.voice.take_block(heard, samples)? {
+    /// Takes the sound that `block` may know and makes features of it, if there is any.
+    fn listen(&mut self, exec: &mut Exec, engine: &Engine, block: u64) -> Result<bool> {
+        let Some(known) = self.known(block) else { return Ok(false) };
+        if !self.voice.take_block(known, &mut self.samples)? {
             self.open = false;
-            return Ok(None);
+            return Ok(false);
         }
         if !self.open {
             self.encoder.reset()?;
             self.open = true;
         }
-        self.encoder.encode(exec, engine, &samples[..], &mut self.features)?;
-        Ok(Some(&self.features))
+        self.encoder.encode(exec, engine, &self.samples[..], &mut self.features)?;
+        Ok(true)
+    }
+
+    /// The features that listening made for the next block, once.
+    fn features(&mut self) -> Result<Option<&[f32]>> {
+        let heard = std::mem::replace(&mut self.heard, Ok(false))?;
+        Ok(heard.then_some(&self.features))
+    }
+}
+
+/// A voice and the block that it listens for.
+pub(super) type Listening<'a> = Option<(u64, &'a mut Ear)>;
+
+/// Lets all of `ears`, of any sessions, listen: side by side where more than one has something to hear.
+pub(super) fn listen(exec: &mut Exec, engine: &Engine, ears: &mut [Listening<'_>]) {
+    let hears = |(block, ear): &&(u64, &mut Ear)| ear.voice.is_present() && ear.known(*block).is_some();
+    let several = ears.iter().flatten().filter(hears).count() > 1;
+    let listen = |exec: &mut Exec, ear: &mut Listening<'_>| {
+        if let Some((block, ear)) = ear {
+            ear.heard = ear.listen(exec, engine, *block);
+        }
+    };
+    if several {
+        exec.each(ears, listen);
+    } else {
+        // One voice by itself has both threads in each of its layers.
+        ears.iter_mut().for_each(|ear| listen(exec, ear));
     }
 }
 
@@ -131,7 +155,6 @@ impl Inputs {
             user: Ear::new(engine, options, engine.config.user_delay_blocks)?,
             track: HeadTrack::new(),
             user_delay: u64::from(engine.config.user_delay_blocks),
-            samples: Box::new([0.0; BLOCK_SAMPLES]),
             condition: Condition::absent(engine.layout()),
         })
     }
@@ -146,8 +169,8 @@ impl Inputs {
 
     /// Lets `block` go by: nobody listens.
     pub(super) fn skip(&mut self, block: u64) -> Result<()> {
-        self.agent.skip(block, &mut self.samples)?;
-        self.user.skip(block, &mut self.samples)
+        self.agent.skip(block)?;
+        self.user.skip(block)
     }
 
     pub(super) fn agent_voice(&mut self) -> &mut Voice {
@@ -168,22 +191,25 @@ impl Inputs {
         known(self.track.sample(frame as f64 / f64::from(FPS), start))
     }
 
-    /// Makes the conditioning of `block`, with the agent's root at the end of the block before.
+    /// The voices, to [`listen`] for `block`.
+    pub(super) fn ears(&mut self, block: u64) -> [Listening<'_>; 2] {
+        [Some((block, &mut self.agent)), Some((block, &mut self.user))]
+    }
+
+    /// Makes the conditioning of `block`, for which voices have listened, with the agent's root at the end of the block before.
     pub(super) fn prepare(
         &mut self,
-        exec: &mut Exec,
-        engine: &Engine,
         block: u64,
         root: &Root,
         gaze: Option<Cue>,
         probe: &mut Option<&mut dyn Probe>,
     ) -> Result<()> {
         self.condition.clear();
-        if let Some(features) = self.agent.listen(exec, engine, block, &mut self.samples)? {
+        if let Some(features) = self.agent.features()? {
             self.condition.set_agent_voice(features);
             tell(probe, block, "agent_features", features);
         }
-        if let Some(features) = self.user.listen(exec, engine, block, &mut self.samples)? {
+        if let Some(features) = self.user.features()? {
             self.condition.set_user_voice(features);
             tell(probe, block, "user_features", features);
         }

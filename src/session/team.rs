@@ -1,11 +1,14 @@
 //! Several sessions stepped together: their rows share each pass over the flow network's weights.
 
 use super::Session;
+use super::block::BlockState;
 use super::governor::{Hold, Plan};
+use super::inputs::listen;
 use crate::engine::Engine;
 use crate::error::{Error, ErrorKind, Result};
 use crate::flow::{SHARED_ROWS, SharedPass};
 use crate::kernels::Exec;
+use crate::vae::{Decoding, SharedDecoding};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -15,7 +18,7 @@ const MEMBERS: usize = SHARED_ROWS / 2;
 /// What it takes to step several sessions of one engine together: threads and working memory.
 ///
 /// Reading the weights is most of a block's time. Sessions whose blocks are due at the same time, and made by the same
-/// sampler with history at the same flow times, go through the flow network side by side, up to 16 rows a pass: four without a gaze target, two with
+/// sampler with history at the same flow times, go through the flow network and the decoder side by side, in the flow network up to 16 rows a pass: four without a gaze target, two with
 /// one, eight on the single-step student. The others are computed one after the other. What each session shows has the bits that
 /// [`Session::poll`] gives.
 ///
@@ -43,6 +46,7 @@ pub struct Team {
     engine: Arc<Engine>,
     exec: Exec,
     pass: SharedPass,
+    decoder: SharedDecoding,
     shared: u64,
 }
 
@@ -60,7 +64,8 @@ impl Team {
     pub(crate) fn new(engine: Arc<Engine>, threads: usize) -> Result<Self> {
         let exec = engine.exec(threads)?;
         let pass = SharedPass::new(engine.nets());
-        Ok(Self { engine, exec, pass, shared: 0 })
+        let decoder = engine.decoder.shared(MEMBERS);
+        Ok(Self { engine, exec, pass, decoder, shared: 0 })
     }
 
     /// Blocks so far that shared their passes with another session's.
@@ -118,7 +123,7 @@ impl Team {
     /// One block of each of `members`, which can share passes. Allocates nothing, takes no lock, makes no system call.
     #[cfg_attr(visavis_rtsan, sanitize(realtime = "nonblocking"))]
     fn block(&mut self, mut members: [Option<Member<'_, '_>>; MEMBERS]) -> Result<()> {
-        let Self { engine, exec, pass, shared } = self;
+        let Self { engine, exec, pass, decoder, shared } = self;
         let mut outcome = Ok(());
         let mut keep = |done: Result<()>| {
             let fine = done.is_ok();
@@ -127,16 +132,26 @@ impl Team {
             }
             fine
         };
-        let alone = members.iter().flatten().count() == 1;
+        let count = members.iter().flatten().count();
+        for (session, _) in members.iter_mut().flatten() {
+            session.done = session.due.take();
+        }
+        if count == 1 {
+            for (session, _) in members.iter_mut().flatten() {
+                let Session { state, options, done: Some(due), .. } = &mut **session else { continue };
+                keep(state.compute(exec, engine, options, &due.plan, None));
+            }
+            return outcome;
+        }
+        let mut ears = [const { [const { None }; 2] }; MEMBERS];
+        for (ears, (session, _)) in ears.iter_mut().zip(members.iter_mut().flatten()) {
+            *ears = session.state.ears();
+        }
+        listen(exec, engine, &mut ears.as_flattened_mut()[..2 * count]);
         for member in &mut members {
             let Some((session, _)) = member else { continue };
-            let Some(due) = session.due.take() else { continue };
-            session.done = Some(due);
-            let Session { state, options, .. } = &mut **session;
-            if alone {
-                keep(state.compute(exec, engine, options, &due.plan, None));
-                *member = None;
-            } else if keep(state.prepare(exec, engine, options, &due.plan, &mut None)) {
+            let Session { state, options, done: Some(due), .. } = &mut **session else { continue };
+            if keep(state.prepare(engine, options, &due.plan, &mut None)) {
                 state.begin_shared(engine, options, &due.plan);
             } else {
                 *member = None;
@@ -144,15 +159,38 @@ impl Team {
         }
         pass.sample(exec, engine.nets(), &mut members, |member| &mut member.0.state.generator);
         *shared += members.iter().flatten().count() as u64;
-        for (session, _) in members.iter_mut().flatten() {
-            let Session { state, options, done, .. } = &mut **session;
-            let Some(Due { plan, .. }) = done else { continue };
-            if keep(state.complete(exec, engine, options, plan, &mut None)) {
+        let mut decoding: [Option<Decoding<'_>>; MEMBERS] = [const { None }; MEMBERS];
+        for (decoding, (session, _)) in decoding.iter_mut().zip(members.iter_mut().flatten()) {
+            let Session { state, options, .. } = &mut **session;
+            state.take_latent(engine, options, &mut None);
+            *decoding = Some(state.decoding());
+        }
+        engine.decoder.step_all(exec, decoder, &mut decoding);
+        let mut posing: [Option<Posing<'_>>; MEMBERS] = [const { None }; MEMBERS];
+        for (posing, (session, _)) in posing.iter_mut().zip(members.iter_mut().flatten()) {
+            let Session { state, options, done: Some(due), .. } = &mut **session else { continue };
+            state.decoded(exec, engine, options, &due.plan, &mut None);
+            *posing = Some(Posing { state, plan: &due.plan, done: Ok(()) });
+        }
+        exec.pool_mut().each(&mut posing[..count], |_, posing| {
+            let Some(Posing { state, plan, done }) = posing else { return };
+            *done = state.pose(None, engine);
+            if done.is_ok() {
                 state.present(engine, plan, &mut None);
             }
+        });
+        for posing in posing.into_iter().flatten() {
+            keep(posing.done);
         }
         outcome
     }
+}
+
+/// A session whose features are to become frames.
+struct Posing<'a> {
+    state: &'a mut BlockState,
+    plan: &'a Plan,
+    done: Result<()>,
 }
 
 /// The first session that is due, and those that can share its passes; `None` when all are done.

@@ -1,6 +1,6 @@
 //! The decoder: one latent in, four frames of pose features out.
 
-use super::stack::{Stack, StackState};
+use super::stack::{Stack, StackState, Work};
 use crate::bundle::Tensors;
 use crate::config::VaeConfig;
 use crate::error::Result;
@@ -23,6 +23,26 @@ pub struct Decoder {
 /// A decoder's streaming state.
 #[derive(Debug)]
 pub struct DecoderState(StackState);
+
+/// One of several blocks that are decoded together: what [`Decoder::step`] gets.
+#[derive(Debug)]
+pub struct Decoding<'a> {
+    /// The state.
+    pub state: &'a mut DecoderState,
+    /// The latent.
+    pub z: &'a [f32],
+    /// The features.
+    pub out: &'a mut [f32],
+}
+
+/// Working memory of blocks that are decoded together.
+#[derive(Debug)]
+pub struct SharedDecoding {
+    work: Work,
+    /// The frames' tokens of all.
+    hidden: Vec<f32>,
+    out: Vec<f32>,
+}
 
 impl Decoder {
     /// Reads `vae.decoder.*` for poses of `features` channels.
@@ -54,11 +74,52 @@ impl Decoder {
 
     /// Decodes the next block: `z` is `[latent]`, unstandardised; `out` becomes `[4, features]`, standardised.
     pub fn step(&self, exec: &mut Exec, state: &mut DecoderState, z: &[f32], out: &mut [f32]) {
-        let d = self.latent.out_features();
-        state.0.x.copy_from_slice(&self.tokens);
-        exec.linear(&self.latent, z, 1, &mut state.0.x[..d], Epilogue::Add);
+        self.embed(exec, state, z);
         let hidden = self.stack.step(exec, &mut state.0);
-        exec.linear(&self.out, &hidden[d..], BLOCK_FRAMES, out, Epilogue::Store);
+        exec.linear(&self.out, &hidden[self.width()..], BLOCK_FRAMES, out, Epilogue::Store);
+    }
+
+    /// Working memory to decode up to `members` blocks together.
+    pub fn shared(&self, members: usize) -> SharedDecoding {
+        let frames = members * BLOCK_FRAMES;
+        SharedDecoding {
+            work: self.stack.work(members),
+            hidden: vec![0.0; frames * self.width()],
+            out: vec![0.0; frames * self.out.out_features()],
+        }
+    }
+
+    /// Decodes the next block of each of `members`, as [`Decoder::step`] does one, with one pass over the weights.
+    ///
+    /// # Panics
+    /// When there are more of them than `shared` is for.
+    pub fn step_all(&self, exec: &mut Exec, shared: &mut SharedDecoding, members: &mut [Option<Decoding<'_>>]) {
+        let (d, features) = (self.width(), self.out.out_features());
+        for member in members.iter_mut().flatten() {
+            self.embed(exec, member.state, member.z);
+        }
+        let SharedDecoding { work, hidden, out } = shared;
+        let tokens = self.stack.step_all(exec, work, members, |member| &mut member.state.0);
+        for (tokens, hidden) in tokens.chunks_exact(TOKENS * d).zip(hidden.chunks_exact_mut(BLOCK_FRAMES * d)) {
+            hidden.copy_from_slice(&tokens[d..]);
+        }
+        let frames = tokens.len() / (TOKENS * d) * BLOCK_FRAMES;
+        let out = &mut out[..frames * features];
+        exec.linear(&self.out, &hidden[..frames * d], frames, out, Epilogue::Store);
+        for (member, out) in members.iter_mut().flatten().zip(out.chunks_exact(BLOCK_FRAMES * features)) {
+            member.out.copy_from_slice(out);
+        }
+    }
+
+    /// Token embeddings of the next block.
+    fn embed(&self, exec: &mut Exec, state: &mut DecoderState, z: &[f32]) {
+        let x = &mut state.0.work.x;
+        x.copy_from_slice(&self.tokens);
+        exec.linear(&self.latent, z, 1, &mut x[..self.width()], Epilogue::Add);
+    }
+
+    fn width(&self) -> usize {
+        self.latent.out_features()
     }
 }
 

@@ -59,8 +59,8 @@ impl Encoder {
     /// Encodes the next block: `frames` is `[4, features]`, standardised; `mu` becomes `[latent]`, unstandardised.
     pub fn step(&self, exec: &mut Exec, state: &mut EncoderState, frames: &[f32], mu: &mut [f32]) {
         let d = self.frame.out_features();
-        state.0.x.copy_from_slice(&self.tokens);
-        exec.linear(&self.frame, frames, BLOCK_FRAMES, &mut state.0.x[..BLOCK_FRAMES * d], Epilogue::Add);
+        state.0.work.x.copy_from_slice(&self.tokens);
+        exec.linear(&self.frame, frames, BLOCK_FRAMES, &mut state.0.work.x[..BLOCK_FRAMES * d], Epilogue::Add);
         let hidden = self.stack.step(exec, &mut state.0);
         exec.linear(&self.mu, &hidden[BLOCK_FRAMES * d..][..d], 1, mu, Epilogue::Store);
     }

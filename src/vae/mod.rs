@@ -10,5 +10,5 @@ mod decoder;
 mod encoder;
 mod stack;
 
-pub use decoder::{Decoder, DecoderState};
+pub use decoder::{Decoder, DecoderState, Decoding, SharedDecoding};
 pub use encoder::{Encoder, EncoderState};

@@ -34,10 +34,19 @@ pub(super) struct StackState {
     /// Block that the sequence started with.
     first: u64,
     rows: Rows,
+    pub(super) work: Work,
+}
+
+/// Working memory of a pass through a stack.
+#[derive(Debug)]
+pub(super) struct Work {
     phases: Phases,
     scratch: Scratch,
+    /// Token embeddings, and what becomes of them.
     pub(super) x: Vec<f32>,
     normed: Vec<f32>,
+    /// Every row uses the one row of its norm's table.
+    index: Vec<u32>,
 }
 
 impl Stack {
@@ -76,25 +85,78 @@ impl Stack {
             block: 0,
             first: 0,
             rows: Rows::with_capacity(n),
+            work: self.work(1),
+        }
+    }
+
+    /// Working memory for blocks of up to `states` states, which run together.
+    pub(super) fn work(&self, states: usize) -> Work {
+        let (n, d) = (self.tokens * states, self.config.width);
+        Work {
             phases: self.rope.phases(n),
             scratch: Scratch::new(n, d, d * self.config.mlp),
             x: vec![0.0; n * d],
             normed: vec![0.0; n * d],
+            index: vec![0; n],
         }
     }
 
-    /// Runs the block whose token embeddings are in `state.x`; returns the normed outputs, `tokens x width`.
+    /// Runs the block whose token embeddings are in `state.work.x`; returns the normed outputs, `tokens x width`.
     pub(super) fn step<'s>(&self, exec: &mut Exec, state: &'s mut StackState) -> &'s [f32] {
-        let (n, d) = (self.tokens as u64, self.config.width);
+        self.stage(state);
+        let StackState { cache, rows, work, .. } = state;
+        self.run(exec, self.tokens, work, &mut |exec, layer, qkv, out| rows.attend(exec, layer, cache, qkv, out))
+    }
+
+    /// The same for the states of all `members`, whose rows go through the layers together; returns the outputs of all, one after
+    /// the other. A row's results depend on that row and its own cache alone, bit for bit.
+    pub(super) fn step_all<'w, M>(
+        &self,
+        exec: &mut Exec,
+        work: &'w mut Work,
+        members: &mut [Option<M>],
+        state: impl for<'a> Fn(&'a mut M) -> &'a mut StackState + Copy,
+    ) -> &'w [f32] {
+        let (n, d) = (self.tokens, self.config.width);
+        let mut rows = 0;
+        for state in members.iter_mut().flatten().map(state) {
+            self.stage(state);
+            work.x[rows * d..][..n * d].copy_from_slice(&state.work.x);
+            work.phases.copy_rows(rows, &state.work.phases, n, d / self.config.heads / 2);
+            rows += n;
+        }
+        self.run(exec, rows, work, &mut |exec, layer, qkv, out| {
+            let states = members.iter_mut().flatten().map(state);
+            for ((state, qkv), out) in states.zip(qkv.chunks_exact(n * 3 * d)).zip(out.chunks_exact_mut(n * d)) {
+                state.rows.attend(exec, layer, &mut state.cache, qkv, out);
+            }
+        })
+    }
+
+    /// Fills the rows of a block and goes on to the next.
+    fn stage(&self, state: &mut StackState) {
+        let n = self.tokens as u64;
         let oldest = (state.block + 1).saturating_sub(self.config.window_blocks as u64).max(state.first);
         state.rows.clear();
         for row in 0..n {
             let position = state.block * n + row;
             state.rows.push(0, position, oldest * n);
-            self.rope.fill(&mut state.phases, row as usize, position);
+            self.rope.fill(&mut state.work.phases, row as usize, position);
         }
         state.block += 1;
-        let index = &ROW_ZERO[..n as usize];
+    }
+
+    /// Runs the first `n` rows of `work` through the layers; `attend` gets the number of the layer too. Returns the normed outputs.
+    fn run<'w>(
+        &self,
+        exec: &mut Exec,
+        n: usize,
+        work: &'w mut Work,
+        attend: &mut dyn FnMut(&mut Exec, usize, &[f32], &mut [f32]),
+    ) -> &'w [f32] {
+        let d = self.config.width;
+        let Work { phases, scratch, x, normed, index } = work;
+        let (index, normed) = (&index[..n], &mut normed[..n * d]);
         for (i, (layer, norms)) in self.layers.iter().enumerate() {
             let norms = LayerNorms {
                 norm1: norms.ln1.tables(d, index),
@@ -103,29 +165,15 @@ impl Stack {
                 gate2: None,
             };
             let heads = self.config.heads;
-            let StackState { cache, rows, phases, scratch, x, .. } = &mut *state;
-            layer.run(
-                exec,
-                heads,
-                norms,
-                phases,
-                n as usize,
-                scratch,
-                x,
-                &mut |exec, qkv, out| {
-                    rows.attend(exec, i, cache, qkv, out);
-                },
-                self.layers.get(i + 1).map(|(layer, _)| layer),
-            );
+            let next = self.layers.get(i + 1).map(|(layer, _)| layer);
+            let attend = &mut |exec: &mut Exec, qkv: &[f32], out: &mut [f32]| attend(exec, i, qkv, out);
+            layer.run(exec, heads, norms, phases, n, scratch, x, attend, next);
         }
         let (shift, scale) = self.final_norm.tables(d, index);
-        exec.norm(&state.x, n as usize, d, shift, scale, &mut state.normed);
-        &state.normed
+        exec.norm(&x[..n * d], n, d, shift, scale, normed);
+        normed
     }
 }
-
-/// Every row of a VAE pass uses the one row of its norm's table.
-const ROW_ZERO: [u32; 8] = [0; 8];
 
 impl Affine {
     fn load(t: &Tensors<'_>, name: &str, d: usize) -> Result<Self> {

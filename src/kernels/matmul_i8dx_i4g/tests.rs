@@ -1,7 +1,7 @@
 use half::f16;
 
 use super::{GROUP, Geometry, Job, VARIANTS};
-use crate::kernels::packed::{Buffer, NR, TILE_COLS, Tile};
+use crate::kernels::packed::{Buffer, NR, Onward, TILE_COLS, Tile};
 use crate::kernels::testing::{Random, available, bits};
 
 /// Runs every available variant; bits as of the reference, and values as of plain loops in f64.

@@ -1,5 +1,5 @@
 use super::{Geometry, Job, Layout, VARIANTS};
-use crate::kernels::packed::{Buffer, NR, TILE_COLS, Tile};
+use crate::kernels::packed::{Buffer, NR, Onward, TILE_COLS, Tile};
 use crate::kernels::quantize_rows::GROUP;
 use crate::kernels::testing::{Random, available};
 
