@@ -30,8 +30,9 @@ struct Place<'a> {
 impl<'a> Place<'a> {
     /// The first place, or the second while another thread has that.
     ///
-    /// Two threads are never in one place: the second is entered only while the other thread is in the first, and whoever
-    /// comes back to find the other in the second finds the first free. `AcqRel` hands on what was done in either.
+    /// Two threads are never in one place: the second is entered only while the other thread is in the first, and
+    /// whoever comes back to find the other in the second finds the first free. `AcqRel` hands on what was done in
+    /// either.
     fn take(first: &'a AtomicBool) -> Self {
         Self { first, number: usize::from(first.swap(true, Ordering::AcqRel)) }
     }
@@ -54,8 +55,8 @@ impl Pool {
         self.each_with(&mut [(), ()], items, |(), i, item| work(i, item));
     }
 
-    /// The same with something for each thread to work with: `tools` are of no thread in particular, but no two calls at
-    /// a time get the same one.
+    /// The same with something for each thread to work with: `tools` are of no thread in particular, but no two calls
+    /// at a time get the same one.
     ///
     /// # Panics
     /// As [`Pool::run`].

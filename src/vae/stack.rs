@@ -111,8 +111,8 @@ impl Stack {
         self.run(exec, self.tokens, work, &mut |exec, layer, qkv, out| rows.attend(exec, layer, cache, qkv, out))
     }
 
-    /// The same for the states of all `members`, whose rows go through the layers together; returns the outputs of all, one
-    /// after the other. A row's results depend on that row and its own cache alone, bit for bit.
+    /// The same for the states of all `members`, whose rows go through the layers together; returns the outputs of
+    /// all, one after the other. A row's results depend on that row and its own cache alone, bit for bit.
     pub(super) fn step_all<'w, M>(
         &self,
         exec: &mut Exec,
