@@ -5,7 +5,8 @@ use crate::error::Result;
 use crate::par::Pool;
 
 impl Exec {
-    /// The same with scratch of `limits` for each of two threads, if it has two: [`Exec::each`] shares out what keeps within them.
+    /// The same with scratch of `limits` for each of two threads, if it has two: [`Exec::each`] shares out what keeps
+    /// within them.
     ///
     /// # Errors
     /// As [`Exec::new`].
@@ -20,8 +21,9 @@ impl Exec {
         &mut self.pool
     }
 
-    /// Calls `work` once for each of `items`: side by side, with an `Exec` of one thread each, or, where there is one item only or
-    /// there are no [lanes](Exec::with_lanes), one after the other with this one. What comes out has the same bits.
+    /// Calls `work` once for each of `items`: side by side, with an `Exec` of one thread each, or, where there is one
+    /// item only or there are no [lanes](Exec::with_lanes), one after the other with this one. What comes out has the
+    /// same bits.
     ///
     /// # Panics
     /// With the panic of one of them.

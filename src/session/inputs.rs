@@ -196,7 +196,8 @@ impl Inputs {
         [Some((block, &mut self.agent)), Some((block, &mut self.user))]
     }
 
-    /// Makes the conditioning of `block`, for which voices have listened, with the agent's root at the end of the block before.
+    /// Makes the conditioning of `block`, for which voices have listened, with the agent's root at the end of the block
+    /// before.
     pub(super) fn prepare(
         &mut self,
         block: u64,

@@ -18,8 +18,9 @@ const MEMBERS: usize = SHARED_ROWS / 2;
 /// What it takes to step several sessions of one engine together: threads and working memory.
 ///
 /// Reading the weights is most of a block's time. Sessions whose blocks are due at the same time, and made by the same
-/// sampler with history at the same flow times, go through the flow network and the decoder side by side, in the flow network up to 16 rows a pass: four without a gaze target, two with
-/// one, eight on the single-step student. The others are computed one after the other. What each session shows has the bits that
+/// sampler with history at the same flow times, go through the flow network and the decoder side by side, in the flow
+/// network up to 16 rows a pass: four without a gaze target, two with one, eight on the single-step student. The
+/// others are computed one after the other. What each session shows has the bits that
 /// [`Session::poll`] gives.
 ///
 /// A team has threads of its own: make the sessions with one thread.

@@ -49,6 +49,9 @@ pub(super) struct Work {
     index: Vec<u32>,
 }
 
+/// The attention of a layer: gets its number and what [`crate::nn::Attention`] gets.
+type Attention<'a> = dyn FnMut(&mut Exec, usize, &[f32], &mut [f32]) + 'a;
+
 impl Stack {
     /// Reads `{prefix}.layers.*` and `{prefix}.ln_f` for blocks of `tokens` tokens.
     pub(super) fn load(t: &Tensors<'_>, kernels: Kernels, c: &VaeConfig, prefix: &str, tokens: usize) -> Result<Self> {
@@ -108,8 +111,8 @@ impl Stack {
         self.run(exec, self.tokens, work, &mut |exec, layer, qkv, out| rows.attend(exec, layer, cache, qkv, out))
     }
 
-    /// The same for the states of all `members`, whose rows go through the layers together; returns the outputs of all, one after
-    /// the other. A row's results depend on that row and its own cache alone, bit for bit.
+    /// The same for the states of all `members`, whose rows go through the layers together; returns the outputs of
+    /// all, one after the other. A row's results depend on that row and its own cache alone, bit for bit.
     pub(super) fn step_all<'w, M>(
         &self,
         exec: &mut Exec,
@@ -146,14 +149,8 @@ impl Stack {
         state.block += 1;
     }
 
-    /// Runs the first `n` rows of `work` through the layers; `attend` gets the number of the layer too. Returns the normed outputs.
-    fn run<'w>(
-        &self,
-        exec: &mut Exec,
-        n: usize,
-        work: &'w mut Work,
-        attend: &mut dyn FnMut(&mut Exec, usize, &[f32], &mut [f32]),
-    ) -> &'w [f32] {
+    /// Runs the first `n` rows of `work` through the layers and returns the normed outputs.
+    fn run<'w>(&self, exec: &mut Exec, n: usize, work: &'w mut Work, attend: &mut Attention<'_>) -> &'w [f32] {
         let d = self.config.width;
         let Work { phases, scratch, x, normed, index } = work;
         let (index, normed) = (&index[..n], &mut normed[..n * d]);
