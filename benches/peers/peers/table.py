@@ -7,7 +7,7 @@ TITLES = {
     "visavis-f32": "Visavis f32", "visavis-i8": "**Visavis i8**", "visavis-i4": "**Visavis i4**", "ort-f32": "ONNX Runtime f32", "ort-i8": "ONNX Runtime int8 (dynamic)",
     "ort-i4": "ONNX Runtime 4-bit (MatMulNBits)", "openvino-f32": "OpenVINO f32", "openvino-i8": "OpenVINO int8 (weights by NNCF)", "openvino-static": "OpenVINO int8 (static by NNCF)", "openvino-i4": "OpenVINO int4 (NNCF)",
     "torch-f32": "PyTorch f32", "torch-i8": "PyTorch int8 (dynamic)", "tract-f32": "tract f32", "candle-f32": "candle f32", "candle-q8": "candle Q8_0", "candle-q4": "candle Q4_0",
-    "ggml-q8": "ggml Q8_0 (repacked)", "ggml-q4": "ggml Q4_0 (repacked)",
+    "ggml-q8": "ggml Q8_0", "ggml-q4": "ggml Q4_0 (repacked)",
 }
 
 

@@ -1,4 +1,4 @@
-"""ggml through ggml-python, built for this machine's instructions: weights in Q8_0 or Q4_0, in the buffer type that repacks them for it."""
+"""ggml through ggml-python, built for this machine's instructions: weights in Q8_0 or Q4_0, in the buffer type that repacks them where it does."""
 import ctypes
 import os
 import sys
@@ -8,8 +8,8 @@ import numpy as np
 from safetensors.numpy import load_file, save_file
 
 VARIANTS = {
-    "ggml-q8": "Q8_0 in the repacking buffer, a graph a slot, allocated once; biases, norms and caches f32",
-    "ggml-q4": "Q4_0; otherwise as Q8_0",
+    "ggml-q8": "Q8_0, multiplied by llamafile's kernels on x86 (ggml repacks none there), a graph a slot, allocated once; biases, norms and caches f32",
+    "ggml-q4": "Q4_0 in the repacking buffer; otherwise as Q8_0",
 }
 TYPES = {"ggml-q8": g.GGML_TYPE_Q8_0, "ggml-q4": g.GGML_TYPE_Q4_0}
 

@@ -5,6 +5,7 @@ import onnx
 import onnxruntime as rt
 from onnxruntime.quantization import QuantType, quantize_dynamic
 from onnxruntime.quantization.matmul_nbits_quantizer import MatMulNBitsQuantizer
+from onnxruntime.quantization.onnx_model import ONNXModel
 
 VARIANTS = {
     "ort-f32": "all graph optimisations, one thread pool for both sessions, caches bound in place",
@@ -21,7 +22,10 @@ def prepare(folder, variant):
         if variant == "ort-i8":
             quantize_dynamic(source, to, per_channel=True, weight_type=QuantType.QInt8, extra_options={"MatMulConstBOnly": True})
         else:
-            quantizer = MatMulNBitsQuantizer(onnx.load(source), block_size=32, is_symmetric=True, accuracy_level=4)
+            model = ONNXModel(onnx.load(source))
+            # Gemm is left f32 otherwise.
+            model.replace_gemm_with_matmul()
+            quantizer = MatMulNBitsQuantizer(model.model, block_size=32, is_symmetric=True, accuracy_level=4)
             quantizer.process()
             quantizer.model.save_model_to_file(to)
 
