@@ -19,7 +19,7 @@
 //! | `epilogue` | what follows a product: scales, bias, then store, GELU, or addition to the residual stream, gated or not | every product |
 //! | `norm` | layer normalisation with AdaLN's shift and scale | flow, autoencoder |
 //! | `rope` | rotary positions | queries and keys |
-//! | `attend` | attention over rings of cached keys and values, softmax included | flow, autoencoder |
+//! | `attend` | attention over rings of cached keys and values, softmax included; rows of one ring read them together | flow, autoencoder |
 //! | `gelu` | GELU and SiLU by themselves | embedding of the flow time |
 //! | `fold` (one file) | a product of float matrices in f64 | two layers that become one when a bundle is loaded |
 //! | `polar` | nearest rotations of 3x3 matrices | all joints of a frame |

@@ -1,6 +1,6 @@
 use std::arch::x86_64::*;
 
-use super::lanes::Sixteen;
+use super::sixteen::Sixteen;
 use super::{Head, Row, group};
 
 #[target_feature(enable = "avx2,fma,f16c")]

@@ -5,8 +5,8 @@
 
 use std::ops::Range;
 
-use super::lanes::{Sixteen, Stored};
 use super::scalar::{self, fold_chunk, soften};
+use super::sixteen::{Sixteen, Stored};
 use super::{CHUNK, Head, MAX_GROUP, Row};
 
 /// Tokens ahead of the one in work whose keys are asked for.

@@ -15,11 +15,11 @@ mod avx512;
 mod cache;
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 mod group;
-#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
-mod lanes;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 mod scalar;
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+mod sixteen;
 
 pub(crate) use cache::Store;
 pub use cache::{KvCache, KvDtype, Span};

@@ -1,6 +1,6 @@
 use std::arch::aarch64::*;
 
-use super::lanes::Sixteen;
+use super::sixteen::Sixteen;
 use super::{Head, Row, group};
 
 #[target_feature(enable = "neon")]
