@@ -39,7 +39,7 @@ address)
   ;;
 thread)
   RUSTFLAGS+=' -Cunsafe-allow-abi-mismatch=sanitizer' "${cargo[@]}" --lib -- par:: kernels::exec session::
-  [ "${2:-}" != full ] || RUSTFLAGS+=' -Cunsafe-allow-abi-mismatch=sanitizer' "${cargo[@]}" --test session --test governor
+  [ "${2:-}" != full ] || RUSTFLAGS+=' -Cunsafe-allow-abi-mismatch=sanitizer' "${cargo[@]}" --test session --test governor --test team
   ;;
 realtime)
   RUSTFLAGS+=' --cfg visavis_rtsan' "${cargo[@]}" --test realtime --test governor
