@@ -6,7 +6,7 @@ use crate::bundle::Tensors;
 use crate::config::FlowConfig;
 use crate::error::Result;
 use crate::kernels::{Epilogue, Exec, Kernels, Matrix, WeightData, Weights};
-use crate::nn::{Layer, Rope};
+use crate::nn::{Attention, Layer, Phases, Rope, Scratch, run_layers};
 use std::sync::Arc;
 
 /// Weights of a flow network, reference or student.
@@ -25,7 +25,7 @@ pub struct FlowNet {
     embed_agent_voice: Matrix,
     embed_user_voice: Matrix,
     embed_gaze: Matrix,
-    pub(super) layers: Vec<Layer>,
+    layers: Vec<Layer>,
     pub(super) out: Matrix,
     pub(super) rope: Rope,
     modulator: Modulator,
@@ -90,9 +90,22 @@ impl FlowNet {
         })
     }
 
-    /// The layer that probably runs after layer `i`: the last one's is the first of the next evaluation.
-    pub(super) fn layer_after(&self, i: usize) -> Option<&Layer> {
-        self.layers.get(i + 1).or(self.layers.first())
+    /// Runs `n` rows of `x` through the layers, with the modulation that each row's entry of `index` says.
+    #[allow(clippy::too_many_arguments, reason = "a pass needs all of them, and they have no natural owner")]
+    pub(super) fn run(
+        &self,
+        exec: &mut Exec,
+        modulation: &Modulation,
+        index: &[u32],
+        phases: &Phases,
+        n: usize,
+        scratch: &mut Scratch,
+        x: &mut [f32],
+        attention: &mut Attention<'_>,
+    ) {
+        let layers = self.layers.iter().enumerate().map(|(i, layer)| (layer, modulation.layer(i, index)));
+        // The next evaluation begins with the first layer again.
+        run_layers(exec, self.config().heads, layers, self.layers.first(), phases, n, scratch, x, attention);
     }
 
     /// Bytes of the packed matrices that one evaluation reads.

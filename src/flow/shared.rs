@@ -103,26 +103,13 @@ impl SharedPass {
         }
         let Some(modulation) = self.modulation.take() else { return };
         let Self { scratch, phases, index, x, rows, .. } = self;
-        for (l, layer) in net.layers.iter().enumerate() {
-            let norms = modulation.layer(l, index);
-            layer.run(
-                exec,
-                heads,
-                norms,
-                phases,
-                *rows,
-                scratch,
-                x,
-                &mut |exec, qkv, out| {
-                    let mut from = 0;
-                    for generator in members.iter_mut().flatten().map(generator) {
-                        let (qkv, out) = (&qkv[from * 3 * d..], &mut out[from * d..]);
-                        from += generator.part().map_or(0, |part| part.slots.attend(exec, l, qkv, out));
-                    }
-                },
-                net.layer_after(l),
-            );
-        }
+        net.run(exec, &modulation, index, phases, *rows, scratch, x, &mut |exec, layer, qkv, out| {
+            let mut from = 0;
+            for generator in members.iter_mut().flatten().map(generator) {
+                let (qkv, out) = (&qkv[from * 3 * d..], &mut out[from * d..]);
+                from += generator.part().map_or(0, |part| part.slots.attend(exec, layer, qkv, out));
+            }
+        });
         let mut from = 0;
         for generator in members.iter_mut().flatten().map(generator) {
             let slot = generator.slot(i);

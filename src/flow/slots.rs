@@ -292,24 +292,10 @@ impl Slots {
         new: Option<&[f32]>,
     ) {
         self.stage(exec, net, history, slot, commit.clone(), new);
-        let (heads, n) = (net.config().heads, self.rows.len());
         let Self { modulation, mod_index, cache, rows, phases, scratch, x, .. } = &mut *self;
-        for (i, layer) in net.layers.iter().enumerate() {
-            let norms = modulation.layer(i, mod_index);
-            layer.run(
-                exec,
-                heads,
-                norms,
-                phases,
-                n,
-                scratch,
-                x,
-                &mut |exec, qkv, out| {
-                    rows.attend(exec, i, cache, qkv, out);
-                },
-                net.layer_after(i),
-            );
-        }
+        net.run(exec, modulation, mod_index, phases, rows.len(), scratch, x, &mut |exec, layer, qkv, out| {
+            rows.attend(exec, layer, cache, qkv, out);
+        });
         self.finish(exec, net, history, slot, commit, new.is_some());
     }
 

@@ -110,8 +110,30 @@ impl Scratch {
     }
 }
 
-/// The attention of a pass: gets queries, keys and values, `rows x 3d`, and fills what each row attends to, `rows x d`.
-pub type Attention<'a> = dyn FnMut(&mut Exec, &[f32], &mut [f32]) + 'a;
+/// The attention of a pass: gets a layer's number and its queries, keys and values, `rows x 3d`, and fills what each row attends to,
+/// `rows x d`.
+pub type Attention<'a> = dyn FnMut(&mut Exec, usize, &[f32], &mut [f32]) + 'a;
+
+/// Runs `layers`, each with its norms, over `x` (`n x d`, in place). `attention` is [`Rows::attend`] of each of the caches that the
+/// rows belong to; `then` is the layer that will probably run after the last one.
+#[allow(clippy::too_many_arguments, reason = "a pass needs all of them, and they have no natural owner")]
+pub fn run_layers<'a>(
+    exec: &mut Exec,
+    heads: usize,
+    layers: impl Iterator<Item = (&'a Layer, LayerNorms<'a>)>,
+    then: Option<&'a Layer>,
+    phases: &Phases,
+    n: usize,
+    scratch: &mut Scratch,
+    x: &mut [f32],
+    attention: &mut Attention<'_>,
+) {
+    let mut layers = layers.enumerate().peekable();
+    while let Some((i, (layer, norms))) = layers.next() {
+        let next = layers.peek().map(|(_, (next, _))| *next).or(then);
+        layer.run(exec, heads, norms, phases, n, scratch, x, |exec, qkv, out| attention(exec, i, qkv, out), next);
+    }
+}
 
 impl Layer {
     /// Bytes of the packed matrices.
@@ -119,10 +141,9 @@ impl Layer {
         [&self.qkv, &self.proj, &self.fc1, &self.fc2].into_iter().map(Matrix::bytes).sum()
     }
 
-    /// Runs the layer over `x` (`n x d`, in place). `attention` is [`Rows::attend`] of each of the caches that the rows belong to;
-    /// `next` is the layer that will probably run after this one.
+    /// Runs the layer; `next` is the one that will probably run after it.
     #[allow(clippy::too_many_arguments, reason = "a layer's pass needs all of them, and they have no natural owner")]
-    pub fn run(
+    fn run(
         &self,
         exec: &mut Exec,
         heads: usize,
@@ -131,7 +152,7 @@ impl Layer {
         n: usize,
         scratch: &mut Scratch,
         x: &mut [f32],
-        attention: &mut Attention<'_>,
+        attention: impl FnOnce(&mut Exec, &[f32], &mut [f32]),
         next: Option<&Layer>,
     ) {
         let d = self.proj.out_features();

@@ -5,5 +5,5 @@
 mod layer;
 mod rope;
 
-pub use layer::{Attention, Layer, LayerNorms, Rows, Scratch};
+pub use layer::{Attention, Layer, LayerNorms, Rows, Scratch, run_layers};
 pub use rope::{PERIOD, Phases, Rope};

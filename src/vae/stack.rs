@@ -4,7 +4,7 @@ use crate::bundle::Tensors;
 use crate::config::VaeConfig;
 use crate::error::Result;
 use crate::kernels::{Exec, Kernels, KvCache, KvDtype, RowTable};
-use crate::nn::{Layer, LayerNorms, Phases, Rope, Rows, Scratch};
+use crate::nn::{Attention, Layer, LayerNorms, Phases, Rope, Rows, Scratch, run_layers};
 
 /// Weights of a stack of layers and its final norm.
 #[derive(Debug)]
@@ -48,9 +48,6 @@ pub(super) struct Work {
     /// Every row uses the one row of its norm's table.
     index: Vec<u32>,
 }
-
-/// The attention of a layer: gets its number and what [`crate::nn::Attention`] gets.
-type Attention<'a> = dyn FnMut(&mut Exec, usize, &[f32], &mut [f32]) + 'a;
 
 impl Stack {
     /// Reads `{prefix}.layers.*` and `{prefix}.ln_f` for blocks of `tokens` tokens.
@@ -154,18 +151,16 @@ impl Stack {
         let d = self.config.width;
         let Work { phases, scratch, x, normed, index } = work;
         let (index, normed) = (&index[..n], &mut normed[..n * d]);
-        for (i, (layer, norms)) in self.layers.iter().enumerate() {
+        let layers = self.layers.iter().map(|(layer, norms)| {
             let norms = LayerNorms {
                 norm1: norms.ln1.tables(d, index),
                 gate1: None,
                 norm2: norms.ln2.tables(d, index),
                 gate2: None,
             };
-            let heads = self.config.heads;
-            let next = self.layers.get(i + 1).map(|(layer, _)| layer);
-            let attend = &mut |exec: &mut Exec, qkv: &[f32], out: &mut [f32]| attend(exec, i, qkv, out);
-            layer.run(exec, heads, norms, phases, n, scratch, x, attend, next);
-        }
+            (layer, norms)
+        });
+        run_layers(exec, self.config.heads, layers, None, phases, n, scratch, x, attend);
         let (shift, scale) = self.final_norm.tables(d, index);
         exec.norm(&x[..n * d], n, d, shift, scale, normed);
         normed
