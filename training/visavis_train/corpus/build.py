@@ -37,11 +37,11 @@ def clip_lengths(seed, s, hours):
     return out
 
 
-def talk(rng_key, frames, src, quantile):
-    """One plausible conversation and the number of draws thrown away before it: [(clip, rejected reasons)]."""
+def talk(rng_key, frames, src, *fixed):
+    """One plausible conversation and the reasons of the draws thrown away before it; `fixed` as for `simulate_clip`."""
     rejected = []
     for attempt in range(RETRIES):
-        clip = simulate.simulate_clip(np.random.default_rng([*rng_key, attempt]), frames, src, quantile)
+        clip = simulate.simulate_clip(np.random.default_rng([*rng_key, attempt]), frames, src, *fixed)
         reasons = plausible.faults(clip.positions, clip.rotations, plausible.SIMULATED)
         if not reasons:
             return clip, rejected
@@ -60,7 +60,10 @@ def _start(data, split):
 
 def _write_talk(job):
     folder, seed, s, i, frames = job
-    clip, rejected = talk((seed, s, 2, i), frames, _sources, (0.35 + i * 0.6180339887) % 1.0)  # golden ratio: levels spread evenly
+    # every eighth clip is silent; multiples of irrational numbers spread gaze levels and recordings at rest evenly
+    silent = i % 8 == 3
+    person = (0.5 + (i // 8 if silent else i) * 0.7548776662) % 1.0
+    clip, rejected = talk((seed, s, 2, i), frames, _sources, (0.35 + i * 0.6180339887) % 1.0, person, silent)
     store.save(os.path.join(folder, f"talk_{i:05d}.safetensors"), clip.positions, clip.rotations, clip.user, clip.agent_voice, clip.user_voice,
                {"split": SPLITS[s], "sources": clip.sources, "gaze_level": f"{clip.level.mean():.4f}", "seed": f"{seed}/{s}/{i}", "kind": "talk",
                 "agent_phrases": _seconds(clip.agent_phrases), "user_phrases": _seconds(clip.user_phrases), "joins": clip.joins})

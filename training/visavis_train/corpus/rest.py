@@ -21,11 +21,11 @@ TWIST, FLEX = 0.15, 0.10         # of a resting hand about the forearm and at th
 # Recordings by split; a person is in one split only. The number is how often one is drawn: in train so that the time that
 # is drawn of each makes the mean of the people who did not act (least squares on what each alone gives, near equal times).
 TAKES = {
-    "train": {"reactidle/000_genuine": 0.42, "reactidle/003_genuine": 0.29, "reactidle/007_genuine": 0.24, "reactidle/010_genuine": 0.40,
-              "reactidle/015_genuine": 0.28, "reactidle/001_acted": 0.06, "reactidle/003_acted": 0.04, "reactidle/004_acted": 0.09,
-              "reactidle/007_acted": 0.11, "reactidle/010_acted": 0.14, "reactidle/013_acted": 0.04, "accad_female1/Female1_A04_Look": 0.37,
-              "rocketbox/f_idle_neutral_01": 0.34},
-    "val": {"reactidle/002_genuine": 0.7, "reactidle/011_genuine": 1.2, "reactidle/011_acted": 0.6, "reactidle/002_acted": 0.1},
+    "train": {"reactidle/000_genuine": 0.40, "reactidle/002_genuine": 0.38, "reactidle/003_genuine": 0.29, "reactidle/007_genuine": 0.27,
+              "reactidle/010_genuine": 0.46, "reactidle/015_genuine": 0.40, "reactidle/001_acted": 0.06, "reactidle/002_acted": 0.03,
+              "reactidle/003_acted": 0.03, "reactidle/004_acted": 0.09, "reactidle/007_acted": 0.24, "reactidle/010_acted": 0.08,
+              "accad_female1/Female1_A04_Look": 0.85, "rocketbox/f_idle_neutral_01": 0.34},
+    "val": {"reactidle/011_genuine": 1.0, "reactidle/011_acted": 0.5, "reactidle/013_acted": 0.2},
     "test": {"reactidle/008_genuine": 1.0, "reactidle/008_acted": 0.5, "reactidle/009_acted": 0.5},
 }
 # Ten recordings of people who stand about and do not act: the row that everything is compared with
@@ -190,6 +190,7 @@ def _unrest(rest):
 
 
 PEAK = 5.77       # peak acceleration of a minimum-jerk movement of length d in time T: 5.77 d / T^2
+ENTRY = 15 * FPS  # of a recording is looked through for the best place to enter it
 GENTLE = 0.20     # acceleration [m/s2] that a change-over may add at its peak
 
 
@@ -207,17 +208,20 @@ def _join(rng, rest, spots, other, least):
     """(cost, spot, start, frames): the frame of `spots` and the one of `other` at which a change-over shows least, and over
     how many frames; both bodies alike and calm. `least`: frames of `other` that must follow."""
     last = max(1, len(other) - least)
-    pose, calm = _pose(other)[:last], _unrest(other)[:last]
+    first = int(rng.integers(0, max(1, last - ENTRY)))         # a random stretch, so that all of a recording comes to be seen
+    pose, calm = _pose(other)[first:last][:ENTRY], _unrest(other)[first:last][:ENTRY]
     d = np.linalg.norm(pose[None] - _pose(rest)[spots][:, None], axis=2) + 1.0 * (calm[None] + _unrest(rest)[spots][:, None])
     i, k = np.unravel_index(int((d + 0.03 * rng.random(d.shape)).argmin()), d.shape)
+    cost, k = d[i, k], k + first
     reach = np.linalg.norm(other.wrist[k] - rest.wrist[spots[i]], axis=-1).max()
-    return d[i, k], int(spots[i]), int(k), int(FPS * np.clip(np.sqrt(PEAK * reach / GENTLE), 1.8, 5.0))
+    return cost, int(spots[i]), int(k), int(FPS * np.clip(np.sqrt(PEAK * reach / GENTLE), 1.8, 5.0))
 
 
-def compose(rng, library, frames):
-    """Rest of `frames` frames from the library, the change-overs [(start, end)] and the names of what was used."""
+def compose(rng, library, frames, quantile=None):
+    """Rest of `frames` frames from the library, the change-overs [(start, end)] and the names of what was used. `quantile`:
+    which recording comes first, 0..1 of the weights in their order, else at random."""
     p = library.weights / library.weights.sum()
-    k = int(rng.choice(len(p), p=p))
+    k = int(min(np.searchsorted(np.cumsum(p), rng.random() if quantile is None else quantile), len(p) - 1))
     used = [library.names[k]]
     rest = library.rests[k]
     at = int(rng.integers(0, max(1, len(rest) - 20 * FPS)))

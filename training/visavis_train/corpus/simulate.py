@@ -37,19 +37,20 @@ class Simulated:
     joins: list               # frames (start, end) at which the rest layers change over
 
 
-SILENT = 0.12                     # share of clips in which nobody speaks
+SILENT = 1 / 8                    # share of clips in which nobody speaks
 LOOKS, LOOKS_SILENT = 0.25, 0.6   # how much of a resting person's own looking about shows
 
 
-def simulate_clip(rng, frames, src, level_quantile=None):
-    """Simulates one clip of `frames` frames from `src`; everything random comes from `rng`."""
+def simulate_clip(rng, frames, src, level_quantile=None, rest_quantile=None, silent=None):
+    """Simulates one clip of `frames` frames from `src`; everything random comes from `rng`, but what the quantiles (of the
+    gaze level, of the recordings at rest) and `silent` (nobody speaks) fix."""
     if src.pair is not None and rng.random() < 0.3:
         talk = voices.cut_pair(rng, src.pair, frames)
     else:
         talk = voices.compose(rng, src.voices, frames, rng.uniform(0.3, 0.7))
     drop = rng.random()                              # one voice, or both, absent in some clips
-    silent = drop < SILENT
-    keep_agent, keep_user = drop > SILENT + 0.05, not silent and drop < 0.93
+    silent = rng.random() < SILENT if silent is None else silent
+    keep_agent, keep_user = not silent and drop > 0.05, not silent and drop < 0.93
     agent_phrases = talk.agent_phrases if keep_agent else []
     user_phrases = talk.user_phrases if keep_user else []
     speaking = attention.mask(agent_phrases, frames)
@@ -64,7 +65,7 @@ def simulate_clip(rng, frames, src, level_quantile=None):
     else:
         peaks, strength = [], np.zeros(0)
     liveliness = rng.beta(2.2, 1.3)
-    own, joins, used = rest.compose(rng, src.rests, frames)
+    own, joins, used = rest.compose(rng, src.rests, frames, rest_quantile)
     own, gesture_head, busy = converse.perform(rng, own, src.pieces, agent_phrases, user_phrases, peaks, strength, liveliness)
     arms = gestures.plan(rng, frames, peaks, strength, agent_phrases, src.spots, src.motifs, liveliness, own, busy)
     eye = np.stack([enc.root[:, 0], np.full(frames, 1.56), enc.root[:, 1]], 1)
