@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from ..motion import rig
-from .rest import Rest, arm_layers, clear_trunk, layers, take
+from .rest import Rest, angles, arm_layers, clear_trunk, layers, take
 from .signals import FPS, gaussian, minjerk
 
 ACCAD, ROCKETBOX = "accad_female1/Female1_D3_ConversationGestures", "rocketbox/movebox_conversation"
@@ -53,7 +53,7 @@ def load(data, split):
     shoulder, wrist, elbow = arm_layers(p, r)
     wrist = gaussian(clear_trunk(wrist), 2.0)                 # one depth camera: jitter
     zero = np.zeros((len(p), 3))
-    head = gaussian(_head_in_chest(r), 3.0)
+    head = gaussian(angles(np.swapaxes(r[:, rig.INDEX["upperChest"]], -1, -2) @ r[:, rig.INDEX["head"]]), 3.0)
     man = Rest(zero, zero, zero, np.zeros((len(p), 3, 3)), head - np.median(head, 0), gaussian(shoulder, 3.0), wrist, elbow)
     v = gaussian(np.linalg.norm(np.gradient(wrist, axis=0), axis=-1).max(1), 2.0)
     at = 0
@@ -62,11 +62,6 @@ def load(data, split):
         out.append(("talk", man.cut(at, end)))
         at = end
     return [_piece(k, r) for kind, rest in out for k, r in ((kind, rest), (kind, rest.mirror()))]
-
-
-def _head_in_chest(rotations):
-    h = np.swapaxes(rotations[:, rig.INDEX["upperChest"]], -1, -2) @ rotations[:, rig.INDEX["head"]]
-    return np.stack([rig.yaw_of(h), np.arctan2(-h[:, 1, 2], np.hypot(h[:, 0, 2], h[:, 2, 2])), np.arctan2(h[:, 1, 0], h[:, 1, 1])], 1)
 
 
 def turns(phrases, pause=1.2):

@@ -114,6 +114,11 @@ def clear_trunk(wrist):
     return w
 
 
+def angles(m):
+    """Yaw, pitch (down positive) and roll [T, 3] of rotations [T, 3, 3]."""
+    return np.stack([rig.yaw_of(m), np.arctan2(-m[:, 1, 2], np.hypot(m[:, 0, 2], m[:, 2, 2])), np.arctan2(m[:, 1, 0], m[:, 1, 1])], 1)
+
+
 def layers(positions, rotations):
     """A retargeted recording -> Rest."""
     p, r = lock_feet(positions, rotations)
@@ -124,7 +129,7 @@ def layers(positions, rotations):
     bend = np.clip(gaussian(legs_height(p[:, 0][:, [0, 2]], r[:, 0], ankles) - p[:, 0, 1], 3.0), 0.0, 0.05)
     vec = lambda j: rig.mat_to_rotvec(turn @ r[:, INDEX[j]])
     h = turn @ r[:, INDEX["head"]]
-    head = np.stack([rig.yaw_of(h), np.arctan2(-h[:, 1, 2], np.hypot(h[:, 0, 2], h[:, 2, 2])), np.arctan2(h[:, 1, 0], h[:, 1, 1])], 1)
+    head = angles(h)
     pelvis, chest = vec("hips"), vec("upperChest")
     # captures differ in what they call upright: a recording's own median stands for it, near the usual lean
     pelvis, chest = pelvis - np.median(pelvis, 0) + [0.02, 0, 0], chest - np.median(chest, 0) + [0.02, 0, 0]
@@ -141,7 +146,18 @@ def take(data, name):
     path = os.path.join(data, "motion", name + ".npz")
     if not os.path.exists(path):
         raise FileNotFoundError(f"{path}: the corpus needs this recording of people at rest; see training/README.md for the data")
-    return load_take(path, name)
+    t = load_take(path, name)
+    if name.startswith("reactidle/"):
+        level_head(t.rotations)
+    return t
+
+
+def level_head(rotations, pitch=0.05):
+    """Turns the head, in its own frame, by one rotation, so that its median looks ahead [rad, down positive] and stands upright:
+    where the face of a markerless capture points is not to be trusted, how it moves is."""
+    h = rig.axis_mat("y", -heading(rotations)) @ rotations[:, INDEX["head"]]
+    down, tilt = np.median(angles(h)[:, 1:], 0)
+    rotations[:, INDEX["head"]] = rotations[:, INDEX["head"]] @ rig.axis_mat("z", -tilt) @ rig.axis_mat("x", pitch - down)
 
 
 def dressed(positions, rotations):
