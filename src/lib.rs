@@ -56,7 +56,7 @@ pub use error::{Error, ErrorKind, Result};
 pub use frame::{BLOCK_FRAMES, FPS, Frame, Root, SAMPLE_RATE, Sampler, Transform};
 pub use glam;
 pub use pose::{Joint, Rig};
-pub use session::{Budget, Decision, GazeControl, Governor, Hold, Plan, Session, SessionOptions, Team};
+pub use session::{Budget, Decision, Governor, Hold, Plan, Session, SessionOptions, Team};
 
 /// What a session counts and measures ([`Session::stats`]).
 pub mod stats {

@@ -14,7 +14,8 @@
 //!
 //! A block that has no time for its share gives the round up; a new one starts when there is time.
 
-use super::options::{Anchoring, SessionOptions};
+use super::diagnostics::Anchoring;
+use super::options::SessionOptions;
 use crate::engine::Engine;
 use crate::flow::Generator;
 use crate::frame::{BLOCK_FRAMES, Root};
@@ -78,7 +79,7 @@ pub(super) struct Anchor {
 
 impl Anchor {
     pub(super) fn new(engine: &Engine, options: &SessionOptions) -> Self {
-        let period = match options.anchoring {
+        let period = match options.diagnostics.anchoring {
             _ if engine.encoder.is_none() => 0,
             Anchoring::Bundle => engine.config.session.anchor_period,
             Anchoring::Never => 0,
@@ -97,8 +98,8 @@ impl Anchor {
             anchored_at: 0,
             requested: false,
             anchor: options.start,
-            encoder: engine.encoder.as_ref().map(|encoder| encoder.state(options.cache)),
-            next: engine.decoder.state(options.cache),
+            encoder: engine.encoder.as_ref().map(|encoder| encoder.state(options.diagnostics.cache)),
+            next: engine.decoder.state(options.diagnostics.cache),
             capacity,
             features: vec![0.0; capacity as usize * width],
             latents: vec![0.0; capacity as usize * latent],
