@@ -15,6 +15,7 @@
 //! A block that has no time for its share gives the round up; a new one starts when there is time.
 
 use super::diagnostics::Anchoring;
+use super::governor::Share;
 use super::options::SessionOptions;
 use crate::engine::Engine;
 use crate::flow::Generator;
@@ -36,17 +37,6 @@ enum Phase {
     Refill(usize, u64),
     /// The next block to decode.
     Decode(u64),
-}
-
-/// What a block does for re-anchoring.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Share {
-    /// Blocks that are encoded.
-    pub(super) encoded: u64,
-    /// Passes of eight tokens over a slot.
-    pub(super) passes: u64,
-    /// Blocks that are decoded.
-    pub(super) decoded: u64,
 }
 
 #[derive(Debug)]

@@ -1,6 +1,6 @@
 //! What measurements and checks of the maths change about a session; hosts leave it alone.
 
-use super::{GazeControl, options::argument};
+use super::{GazeControl, argument};
 use crate::audio::AudioBackend;
 use crate::config::CleanHistory;
 use crate::error::Result;

@@ -334,8 +334,7 @@ impl Session {
         (self.state.block * BLOCK_FRAMES as u64) as f64 / f64::from(FPS)
     }
 
-    /// Starts anew, as if just made with the current options: same seed, same bits. Time starts at 0 again (or at that of
-    /// `Diagnostics::first_block`).
+    /// Starts anew, as if just made with the current options: same seed, same bits. Time starts at 0 again.
     ///
     /// # Errors
     /// None that the session's creation would not have met.
@@ -422,4 +421,8 @@ impl std::fmt::Debug for Session {
         let name = &self.engine.config.name;
         f.debug_struct("Session").field("model", name).field("blocks", &self.state.block).finish_non_exhaustive()
     }
+}
+
+fn argument(message: impl Into<String>) -> Error {
+    Error::new(ErrorKind::Argument, message)
 }

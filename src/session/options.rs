@@ -1,10 +1,10 @@
 //! What a session is made with.
 
-use super::Governor;
 use super::diagnostics::{Diagnostics, HistoryTime};
+use super::{Governor, argument};
 use crate::config::CleanHistory;
 use crate::engine::Engine;
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::{Error, Result};
 use crate::flow::Guidance;
 use crate::frame::{Root, Sampler};
 
@@ -138,8 +138,4 @@ pub(super) fn unsupported(sampler: Sampler, engine: &Engine) -> Error {
         }
         Sampler::Euler(_) => format!("{sampler}: Euler takes 1 to 64 steps"),
     })
-}
-
-pub(super) fn argument(message: impl Into<String>) -> Error {
-    Error::new(ErrorKind::Argument, message)
 }
