@@ -4,12 +4,9 @@ mod common;
 
 use common::{Inputs, golden_path, run, tiny};
 use std::sync::Arc;
-use visavis::bundle::BundleFile;
-use visavis::config::{GazeConfig, GazeCurve};
-use visavis::engine::Engine;
-use visavis::error::ErrorKind;
-use visavis::frame::{Frame, Sampler};
-use visavis::session::{GazeControl, SessionOptions};
+use visavis::internals::config::{GazeConfig, GazeCurve};
+use visavis::internals::session::{Diagnostics, GazeControl};
+use visavis::{BundleFile, Engine, ErrorKind, Frame, Sampler, SessionOptions};
 
 const BLOCKS: usize = 12;
 
@@ -23,7 +20,11 @@ fn gaze() -> GazeConfig {
     }
 }
 
-fn with(gaze: &GazeConfig) -> visavis::error::Result<Arc<Engine>> {
+fn control(gaze_control: GazeControl) -> Diagnostics {
+    Diagnostics { gaze_control, ..Default::default() }
+}
+
+fn with(gaze: &GazeConfig) -> visavis::Result<Arc<Engine>> {
     let bytes = BundleFile::open(golden_path("tiny.safetensors"))?.with_gaze(gaze)?;
     Engine::from_bytes(bytes, "calibrated")
 }
@@ -45,7 +46,10 @@ fn targets_and_free_gaze_are_what_the_calibration_says() {
     ];
     for (sampler, wanted, value, gaze_control) in cases {
         let a = motion(&calibrated, SessionOptions { sampler, gaze: wanted, ..Default::default() });
-        let b = motion(&plain, SessionOptions { sampler, gaze: Some(value), gaze_control, ..Default::default() });
+        let b = motion(
+            &plain,
+            SessionOptions { sampler, gaze: Some(value), diagnostics: control(gaze_control), ..Default::default() },
+        );
         assert_eq!(a, b, "{sampler}, target {wanted:?}");
     }
 }
@@ -53,7 +57,8 @@ fn targets_and_free_gaze_are_what_the_calibration_says() {
 #[test]
 fn unguided_is_neither_guided_nor_absent() {
     let engine = tiny();
-    let options = |gaze, gaze_control| SessionOptions { gaze, gaze_control, ..Default::default() };
+    let options =
+        |gaze, gaze_control| SessionOptions { gaze, diagnostics: control(gaze_control), ..Default::default() };
     let unguided = motion(&engine, options(Some(0.3), GazeControl::Unguided));
     assert_ne!(unguided, motion(&engine, options(Some(0.3), GazeControl::Channel)));
     assert_ne!(unguided, motion(&engine, options(None, GazeControl::Channel)));

@@ -3,9 +3,8 @@
 mod common;
 
 use common::{Inputs, poll_blocks, run, tiny};
-use visavis::error::ErrorKind;
-use visavis::frame::{Frame, Sampler};
-use visavis::session::{Anchoring, Budget, Governor, Hold, Session, SessionOptions};
+use visavis::internals::session::Anchoring;
+use visavis::{Budget, ErrorKind, Frame, Governor, Hold, Sampler, Session, SessionOptions};
 
 /// Milliseconds of the last block on a device that is `slow` times slower than one that does eight evaluations in 40 ms.
 fn clock(session: &Session, slow: f64) -> f64 {
@@ -21,7 +20,7 @@ fn clock(session: &Session, slow: f64) -> f64 {
 
 fn options() -> SessionOptions {
     let governor = Governor::Budget(Budget { milliseconds: 100.0, coarse: false });
-    SessionOptions { governor, gaze: Some(0.8), anchoring: Anchoring::Every(40), ..Default::default() }
+    SessionOptions { governor, gaze: Some(0.8), diagnostics: Anchoring::Every(40).into(), ..Default::default() }
 }
 
 /// Polls `blocks` blocks and reports their times; returns the frames and the number of late blocks.

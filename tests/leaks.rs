@@ -11,8 +11,8 @@ use common::tiny;
 use glam::Vec3;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicIsize, Ordering};
-use visavis::frame::Sampler;
-use visavis::session::{Anchoring, SessionOptions};
+use visavis::internals::session::Anchoring;
+use visavis::{Sampler, SessionOptions};
 
 /// The system's allocator, counting bytes that are in use.
 struct Counting;
@@ -65,7 +65,7 @@ fn engines_and_sessions_leave_nothing_behind() {
         let options = SessionOptions {
             threads: 1 + usize::from(i % 4 == 3),
             sampler: samplers[i % samplers.len()],
-            anchoring: Anchoring::Every(2),
+            diagnostics: Anchoring::Every(2).into(),
             ..Default::default()
         };
         let mut session = engine.session(options).expect("a session");
