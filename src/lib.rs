@@ -16,6 +16,7 @@ pub mod frame;
 pub mod kernels;
 pub mod metrics;
 pub mod nn;
+pub mod normaliser;
 pub mod offline;
 #[allow(unsafe_code, reason = "the fork-join pool hands slices to its worker")]
 pub mod par;

@@ -54,7 +54,7 @@ fn stages_with(golden: &Golden, options: SessionOptions) -> BTreeMap<&'static st
 #[test]
 fn every_stage_equals_pytorch() {
     let golden = Golden::load();
-    let ours = stages(&golden, Sampler::Midpoint(4), KvDtype::F32);
+    let ours = stages(&golden, Sampler::Midpoint4, KvDtype::F32);
     let audio = golden.get("agent_features").0[1];
     // The user's voice is heard a block late: the last block of the golden features is not reached.
     let checks = [
@@ -90,8 +90,8 @@ fn every_stage_equals_pytorch() {
 fn cheaper_samplers_equal_pytorch() {
     let golden = Golden::load();
     let cases = [
-        (Sampler::Midpoint(2), "latents.midpoint2"),
-        (Sampler::Midpoint(1), "latents.midpoint1"),
+        (Sampler::Midpoint2, "latents.midpoint2"),
+        (Sampler::Midpoint1, "latents.midpoint1"),
         (Sampler::Single, "student"),
     ];
     for (sampler, name) in cases {
@@ -120,7 +120,7 @@ fn clean_history_equals_pytorch() {
 #[test]
 fn fp16_cache_stays_close() {
     let golden = Golden::load();
-    let ours = stages(&golden, Sampler::Midpoint(4), KvDtype::F16);
+    let ours = stages(&golden, Sampler::Midpoint4, KvDtype::F16);
     let error = max_error(&ours["latents"], &golden.values("latents"));
     println!("fp16 cache: {error:e}");
     assert!(error > 0.0, "the cache is stored in fp16");

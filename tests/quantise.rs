@@ -24,8 +24,7 @@ fn scene(blocks: usize) -> Scene {
     let inputs = Inputs::circling(4.0, 24_000);
     let rows: String = inputs.path.iter().map(|(t, p)| format!("{t},{},{},{}\n", p.x, p.y, p.z)).collect();
     let path = UserPath::parse(&format!("t,x,y,z\n{rows}")).unwrap();
-    Scene::new(&Conversation::new(Some(inputs.agent), Some(inputs.user), Some(path)).unwrap(), blocks, Some(0.5))
-        .unwrap()
+    Conversation::new(Some(inputs.agent), Some(inputs.user), Some(path)).unwrap().scene(blocks, Some(0.5)).unwrap()
 }
 
 #[test]
@@ -39,7 +38,7 @@ fn the_same_input_gives_the_same_bytes() {
 #[test]
 fn blocks_stay_close_in_the_order_of_the_schemes() {
     let reference = Engine::from_file(&tiny_f32(), Kernels::detect().unwrap()).unwrap();
-    for sampler in [Sampler::Midpoint(4), Sampler::Single] {
+    for sampler in [Sampler::Midpoint4, Sampler::Single] {
         let teacher = Teacher::new(&reference, scene(12), sampler, 1, &mut None).unwrap();
         let same = teacher.compare(&reference).unwrap();
         assert_eq!((same.mean_mm(), same.round_trip_mm()), (0.0, 0.0), "nothing differs from itself");
@@ -67,7 +66,7 @@ fn calibrated_rounding_loses_less() {
         assert_eq!(calibrated.bytes.len(), plain.bytes.len());
         assert!(calibrated.bytes == with().bytes);
         // Other noise than the calibration's.
-        let teacher = Teacher::new(&reference, scene(20), Sampler::Midpoint(4), 5, &mut None).unwrap();
+        let teacher = Teacher::new(&reference, scene(20), Sampler::Midpoint4, 5, &mut None).unwrap();
         let latents = |bytes: Vec<u8>| {
             let forced = teacher.compare(&Engine::from_bytes(bytes, "tiny").unwrap()).unwrap();
             visavis::quant::sqnr_db(&forced.latents[0], &forced.latents[1])

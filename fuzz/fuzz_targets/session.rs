@@ -57,12 +57,12 @@ enum Step {
 
 fn sampler(i: u8) -> Sampler {
     match i % 6 {
-        0 => Sampler::Midpoint(4),
+        0 => Sampler::Midpoint4,
         1 => Sampler::Midpoint(i / 6),
         // Mostly few steps.
         2 if i < 252 => Sampler::Euler(i / 6 % 4),
         2 => Sampler::Euler(i - 190),
-        3 => Sampler::Midpoint(2),
+        3 => Sampler::Midpoint2,
         _ => Sampler::Single,
     }
 }

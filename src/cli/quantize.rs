@@ -10,7 +10,7 @@ use visavis::bundle::BundleFile;
 use visavis::error::Result;
 use visavis::export::write_atomically;
 use visavis::kernels::Scheme;
-use visavis::quant::{Budget, Keep, Options, Quantised, SMALL, Scene, quantise};
+use visavis::quant::{Budget, Keep, Options, Quantised, SMALL, quantise};
 
 #[derive(Debug, Args)]
 pub struct QuantizeArgs {
@@ -53,12 +53,12 @@ pub fn run(args: &QuantizeArgs) -> Result<()> {
     };
     let budget = match args.auto {
         None => None,
-        Some(mm) => Some(Budget { mm, scene: Scene::new(&files::conversation()?, BLOCKS, None)?, progress: &progress }),
+        Some(mm) => Some(Budget { mm, scene: files::conversation()?.scene(BLOCKS, None)?, progress: &progress }),
     };
     // Rounding to f16 has nothing to choose.
     let calibrated = args.scheme != Scheme::F16 && !args.plain;
     let calibration = match calibrated {
-        true => Some(Scene::new(&files::conversation()?, usize::MAX, None)?),
+        true => Some(files::conversation()?.scene(usize::MAX, None)?),
         false => None,
     };
     let options = Options {

@@ -8,7 +8,9 @@ use crate::error::Result;
 use crate::frame::{BLOCK_FRAMES, FPS, Frame};
 use crate::kernels::KvDtype;
 use crate::metrics::{Space, ape};
+use crate::normaliser::{Metric, Standardised};
 use crate::pose::{Decoder, Encoder};
+use crate::vae::RoundTrip;
 use glam::Vec3;
 use serde::Serialize;
 
@@ -79,23 +81,22 @@ fn through(engine: &Engine, frames: &[Frame]) -> Result<Vec<Frame>> {
     let radius = engine.config.pose.radius;
     let width = engine.features();
     let mut exec = engine.exec(1)?;
-    let (mut encoder, mut decoder) = (engine.encoder()?.state(KvDtype::F32), engine.decoder.state(KvDtype::F32));
+    let mut networks = RoundTrip::new(engine.encoder()?, &engine.decoder, engine.config.vae.latent, KvDtype::F32);
     let (mut features, mut motion) = (Encoder::new(radius), Decoder::new(engine.kernels, rig, radius));
     motion.reset(frames.first().map(|f| f.root).unwrap_or_default());
-    let (mut x, mut raw) = (vec![0.0; BLOCK_FRAMES * width], vec![0.0; BLOCK_FRAMES * width]);
-    let mut latent = vec![0.0; engine.config.vae.latent];
+    let mut metric = Metric::zeros(BLOCK_FRAMES * width);
+    let [mut x, mut y] = [(); 2].map(|()| Standardised::zeros(BLOCK_FRAMES * width));
     let mut out = Vec::with_capacity(frames.len());
     let mut block = vec![Frame::empty(rig.len()); BLOCK_FRAMES];
     exec.begin();
     for four in frames.chunks_exact(BLOCK_FRAMES) {
-        for (frame, x) in four.iter().zip(raw.chunks_exact_mut(width)) {
-            features.encode(frame.root, &frame.global, x);
+        for (i, frame) in four.iter().enumerate() {
+            features.encode(frame.root, &frame.global, metric.part_mut(i..i + 1, width));
         }
-        engine.pose.standardise(&raw, &mut x);
-        engine.encoder()?.step(&mut exec, &mut encoder, &x, &mut latent);
-        engine.decoder.step(&mut exec, &mut decoder, &latent, &mut x);
-        engine.pose.restore(&mut x);
-        motion.decode_block(&x, &mut block)?;
+        engine.pose.standardise(metric.view(), x.view_mut());
+        networks.step(&mut exec, x.view(), y.view_mut());
+        engine.pose.restore(y.view(), metric.view_mut());
+        motion.decode_block(metric.view(), &mut block)?;
         out.extend(block.iter().cloned());
     }
     exec.end();

@@ -6,7 +6,7 @@ use crate::bundle::Tensors;
 use crate::config::FlowConfig;
 use crate::error::Result;
 use crate::kernels::{Epilogue, Exec, Kernels, Matrix, WeightData, Weights};
-use crate::nn::{Attention, Layer, Phases, Rope, Scratch, run_layers};
+use crate::nn::{Layer, Pass, Rope, Sizes};
 use std::sync::Arc;
 
 /// Weights of a flow network, reference or student.
@@ -26,8 +26,8 @@ pub struct FlowNet {
     embed_user_voice: Matrix,
     embed_gaze: Matrix,
     layers: Vec<Layer>,
-    pub(super) out: Matrix,
-    pub(super) rope: Rope,
+    out: Matrix,
+    rope: Rope,
     modulator: Modulator,
 }
 
@@ -90,22 +90,23 @@ impl FlowNet {
         })
     }
 
-    /// Runs `n` rows of `x` through the layers, with the modulation that each row's entry of `index` says.
-    #[allow(clippy::too_many_arguments, reason = "a pass needs all of them, and they have no natural owner")]
-    pub(super) fn run(
-        &self,
-        exec: &mut Exec,
-        modulation: &Modulation,
-        index: &[u32],
-        phases: &Phases,
-        n: usize,
-        scratch: &mut Scratch,
-        x: &mut [f32],
-        attention: &mut Attention<'_>,
-    ) {
-        let layers = self.layers.iter().enumerate().map(|(i, layer)| (layer, modulation.layer(i, index)));
-        // The next evaluation begins with the first layer again.
-        run_layers(exec, self.config().heads, layers, self.layers.first(), phases, n, scratch, x, attention);
+    /// A pass for up to `rows` rows.
+    pub(super) fn pass(&self, rows: usize) -> Pass {
+        let FlowConfig { width, heads, mlp, .. } = self.config;
+        Pass::new(Sizes { width, heads, hidden: width * mlp }, rows, &self.rope)
+    }
+
+    pub(super) fn layers(&self) -> &[Layer] {
+        &self.layers
+    }
+
+    pub(super) fn rope(&self) -> &Rope {
+        &self.rope
+    }
+
+    /// The projection of normed rows to latents.
+    pub(super) fn out(&self) -> &Matrix {
+        &self.out
     }
 
     /// Bytes of the packed matrices that one evaluation reads.

@@ -25,14 +25,6 @@ pub struct Phases {
     pub sin: Vec<f32>,
 }
 
-impl Phases {
-    /// Copies the first `rows` rows of `other`, `half` phases each, to the rows from `to` on.
-    pub fn copy_rows(&mut self, to: usize, other: &Phases, rows: usize, half: usize) {
-        self.cos[to * half..][..rows * half].copy_from_slice(&other.cos[..rows * half]);
-        self.sin[to * half..][..rows * half].copy_from_slice(&other.sin[..rows * half]);
-    }
-}
-
 impl Rope {
     /// Frequencies of channels `i` below `head_dim / 2`.
     pub fn new(head_dim: usize) -> Self {

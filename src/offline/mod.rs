@@ -31,6 +31,7 @@ pub use path::for_session;
 use crate::audio::Wav;
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES, FPS, SAMPLE_RATE};
+use crate::quant::Scene;
 use crate::recording::Recording;
 use crate::session::{Session, SessionStats};
 use crate::user::UserPath;
@@ -115,6 +116,16 @@ impl Conversation {
     pub fn frames(&self) -> usize {
         // The tolerance keeps a length such as 0.1 s, which is no binary fraction, from costing a frame.
         (self.seconds() * f64::from(FPS) - 1e-6).ceil().max(0.0) as usize
+    }
+
+    /// The first `blocks` blocks of it (all that are whole when it is shorter) for the quantiser and the accuracy report, with a gaze target
+    /// or none.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] when there is not a whole block.
+    pub fn scene(&self, blocks: usize, gaze: Option<f32>) -> Result<Scene> {
+        let heads = self.path.as_ref().map(for_session).unwrap_or_default();
+        Scene::new(self.agent(), self.user(), heads, blocks.min(self.frames() / BLOCK_FRAMES), gaze)
     }
 
     /// The agent's voice, 24 kHz mono.

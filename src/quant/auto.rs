@@ -19,6 +19,7 @@ use crate::error::Result;
 use crate::frame::Sampler;
 use crate::kernels::Scheme;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// What `--auto` is given.
 pub struct Budget<'a> {
@@ -62,7 +63,7 @@ struct Candidate<'a> {
 /// Raises `schemes` until blocks are within `budget`. Layers that `keep` names keep the scheme that it gave them.
 pub(super) fn choose(
     file: &BundleFile<'_>,
-    reference: &Engine,
+    reference: &Arc<Engine>,
     rounder: &Rounder<'_>,
     mut schemes: BTreeMap<String, Scheme>,
     keep: &[Keep],
@@ -143,19 +144,19 @@ fn extra_bytes(layer: &Layer, from: Scheme, to: Scheme) -> f64 {
 /// Measures bundles by teacher-forced blocks.
 struct Meter<'a> {
     file: &'a BundleFile<'a>,
-    reference: &'a Engine,
+    reference: &'a Arc<Engine>,
     rounder: &'a Rounder<'a>,
-    teachers: Vec<Teacher<'a>>,
+    teachers: Vec<Teacher>,
 }
 
 impl<'a> Meter<'a> {
     fn new(
         file: &'a BundleFile<'a>,
-        reference: &'a Engine,
+        reference: &'a Arc<Engine>,
         rounder: &'a Rounder<'a>,
         budget: &Budget<'_>,
     ) -> Result<Self> {
-        let samplers = [Some(Sampler::Midpoint(4)), reference.config().student.map(|_| Sampler::Single)];
+        let samplers = [Some(Sampler::Midpoint4), reference.config().student.map(|_| Sampler::Single)];
         let teachers = samplers
             .into_iter()
             .flatten()
@@ -183,7 +184,7 @@ impl<'a> Meter<'a> {
     }
 
     /// The largest of the errors: of each sampler's blocks, and of the way through encoder and decoder.
-    fn measure(&self, weights: &[(&Layer, StoredWeights)], teachers: &[Teacher<'_>]) -> Result<f64> {
+    fn measure(&self, weights: &[(&Layer, StoredWeights)], teachers: &[Teacher]) -> Result<f64> {
         // As an int8 bundle: there nothing but the matrices changes.
         let bytes = write::bundle(self.file, self.reference, weights, Scheme::I8)?;
         let engine = Engine::from_file(&BundleFile::from_bytes(bytes, self.file.path()), self.reference.kernels())?;

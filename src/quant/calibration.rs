@@ -7,6 +7,7 @@ use crate::engine::Engine;
 use crate::error::Result;
 use crate::frame::Sampler;
 use crate::kernels::Activations;
+use std::sync::Arc;
 
 /// Of the calls of a layer within blocks of eight evaluations, which ones count.
 const EVERY: usize = 5;
@@ -20,9 +21,9 @@ impl Calibration {
     ///
     /// # Errors
     /// None that loading the bundle would not have met.
-    pub fn new(reference: &Engine, scene: &Scene) -> Result<Self> {
+    pub fn new(reference: &Arc<Engine>, scene: &Scene) -> Result<Self> {
         let mut activations = Some(Activations::moments_of(EVERY));
-        Teacher::new(reference, scene.clone(), Sampler::Midpoint(4), 0, &mut activations)?;
+        Teacher::new(reference, scene.clone(), Sampler::Midpoint4, 0, &mut activations)?;
         if reference.config().student.is_some() {
             // One call a block: each counts. The other networks' inputs are the same kind again.
             if let Some(a) = &mut activations {

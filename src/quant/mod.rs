@@ -7,7 +7,7 @@
 //! | `round` | rounding to each scheme, with the scale that loses least |
 //! | `nearest_plane` | rounding by activation statistics |
 //! | `calibration` | those statistics, of a reference run over a conversation |
-//! | `scene`, `walker` | a conversation in blocks, and an engine driven block by block |
+//! | `scene` | a conversation in blocks, played to sessions |
 //! | `teacher` | what quantisation does to a block: teacher-forced runs of two engines side by side |
 //! | `auto` | the scheme of each layer by measured sensitivity |
 //! | `write` | putting the bundle together |
@@ -29,7 +29,6 @@ mod scene;
 mod teacher;
 #[cfg(test)]
 mod tests;
-mod walker;
 mod write;
 
 pub use auto::{Budget, Choice};

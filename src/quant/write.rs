@@ -30,7 +30,7 @@ pub(super) fn bundle(
         let entry = match (name, view.dtype()) {
             (IDLE_FRAMES, _) => {
                 let shape = vec![reference.idle_blocks(), reference.config().vae.latent];
-                (IDLE_LATENTS.to_owned(), Dtype::F32, shape, floats(&reference.idle))
+                (IDLE_LATENTS.to_owned(), Dtype::F32, shape, floats(reference.idle.values()))
             }
             (_, Dtype::F32) if asked == Scheme::F16 && !stays(name, &record) => match narrowed(view.data()) {
                 Some(halves) => (name.to_owned(), Dtype::F16, shape, halves),

@@ -31,7 +31,6 @@ use crate::engine::Engine;
 use crate::error::{Error, ErrorKind, Result};
 use crate::kernels::{Kernels, Scheme};
 use crate::offline::Conversation;
-use crate::quant::Scene;
 use numerics::Loaded;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -102,12 +101,12 @@ pub fn run(options: &Options<'_>) -> Result<Report> {
     let judged = (!options.eval.is_empty()).then(|| Judged::read(&options.eval, other_seed)).transpose()?;
     let (reference, candidates) = load(options)?;
     let progress = options.progress;
-    let scene = Scene::new(options.talk, options.blocks, None)?;
+    let scene = options.talk.scene(options.blocks, None)?;
     let numerics = numerics::measure(&reference, &candidates, &scene, progress)?;
     let machines = match &options.other {
         None => None,
         Some(other) => {
-            let scene = Scene::new(options.talk, other.blocks, None)?;
+            let scene = options.talk.scene(other.blocks, None)?;
             Some([other.clone(), numerics::measure(&reference, &candidates, &scene, &|_| {})?])
         }
     };
@@ -145,7 +144,7 @@ pub fn run(options: &Options<'_>) -> Result<Report> {
 /// As [`run`].
 pub fn numerics(options: &Options<'_>) -> Result<Numerics> {
     let (reference, candidates) = load(options)?;
-    numerics::measure(&reference, &candidates, &Scene::new(options.talk, options.blocks, None)?, options.progress)
+    numerics::measure(&reference, &candidates, &options.talk.scene(options.blocks, None)?, options.progress)
 }
 
 impl Report {

@@ -92,14 +92,14 @@ mod tests {
         let config = config();
         let value = |target, sampler| GazeControl::Calibrated.cue(Some(&config), Some(target), sampler, 0, 7);
         let near = |cue: Option<Cue>, value: f32| cue.is_some_and(|c| (c.value - value).abs() < 1e-6 && c.guided);
-        assert!(near(value(0.3, Sampler::Midpoint(4)), -0.05), "halfway between two points");
+        assert!(near(value(0.3, Sampler::Midpoint4), -0.05), "halfway between two points");
         assert!(near(value(0.5, Sampler::Single), 0.25), "the student has a curve of its own");
-        assert!(near(value(-1.0, Sampler::Midpoint(4)), -0.4) && near(value(1.0, Sampler::Midpoint(2)), 0.7), "ends");
+        assert!(near(value(-1.0, Sampler::Midpoint4), -0.4) && near(value(1.0, Sampler::Midpoint2), 0.7), "ends");
     }
 
     #[test]
     fn without_calibration_targets_are_the_channel() {
-        let cue = |control: GazeControl, config, target| control.cue(config, target, Sampler::Midpoint(4), 0, 0);
+        let cue = |control: GazeControl, config, target| control.cue(config, target, Sampler::Midpoint4, 0, 0);
         assert_eq!(cue(GazeControl::Calibrated, None, Some(0.3)), Some(Cue { value: 0.3, guided: true }));
         assert_eq!(cue(GazeControl::Calibrated, None, None), None);
         let config = config();

@@ -9,11 +9,16 @@
 //! | `options` | what a session is made with |
 //! | `inputs` | voices and head positions to the conditioning of a block |
 //! | `gaze` | the wanted gaze to the gaze channel, free gaze included |
-//! | `block` | the computation of a block |
+//! | `state` | all that changes from block to block |
+//! | `block` | a block, stage by stage |
+//! | `pipeline` | the computation of blocks, one or several together |
+//! | `tools` | threads, working memory and weights, which blocks are computed with |
+//! | `noise` | seeded noise, or given |
 //! | `anchor` | re-anchoring: encoding recent motion anew, spread over blocks |
 //! | `governor/` | quality traded for time, block by block |
 //! | `team` | several sessions stepped together |
 //! | `stats` | block times and counters |
+//! | `forcing` | what the quantiser's teacher does to a session |
 //! | `probe` | every stage of a block, for whoever wants to check the maths |
 //!
 //! After [`Session::poll`] has been called once, computing a block allocates nothing, takes no lock and makes no system
@@ -21,14 +26,20 @@
 
 mod anchor;
 mod block;
+mod forcing;
 mod gaze;
 mod governor;
 mod inputs;
+mod noise;
 mod options;
+mod pipeline;
 mod probe;
+mod state;
 mod stats;
 mod team;
+mod tools;
 
+pub(crate) use forcing::MadeBlock;
 pub use gaze::GazeControl;
 pub use governor::{Budget, Decision, Governor, GovernorStats, Hold, Plan};
 pub use options::{Anchoring, HistoryTime, SessionOptions};
@@ -41,11 +52,14 @@ use crate::engine::Engine;
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{BLOCK_FRAMES, FPS, Frame, Sampler};
 use crate::kernels::Exec;
-use block::BlockState;
+use block::Block;
 use glam::Vec3;
 use governor::{Log, Policy};
+use noise::Noise;
+use state::BlockState;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use tools::{Tools, Workspace};
 
 /// All mutable state of one conversation.
 ///
@@ -55,6 +69,7 @@ pub struct Session {
     engine: Arc<Engine>,
     options: SessionOptions,
     exec: Exec,
+    work: Workspace,
     state: BlockState,
     now: f64,
     times: stats::BlockTimes,
@@ -70,14 +85,29 @@ pub struct Session {
 impl Session {
     pub(crate) fn new(engine: Arc<Engine>, options: SessionOptions) -> Result<Self> {
         options.check(&engine)?;
-        let mut exec = engine.exec(options.threads)?;
+        let exec = engine.exec(options.threads)?;
         options.core_mask.map_or(Ok(()), |mask| exec.pool().pin_helper(mask))?;
+        Self::on(exec, engine, options)
+    }
+
+    /// A session on the threads of `exec`; its options have been checked.
+    fn on(mut exec: Exec, engine: Arc<Engine>, options: SessionOptions) -> Result<Self> {
         let state = BlockState::new(&mut exec, &engine, &options)?;
-        let times = stats::BlockTimes::new();
-        let (log, policy, last) = (Log::new(), None, None);
-        let mut session =
-            Self { engine, options, exec, state, now: 0.0, times, policy, log, last, due: None, done: None };
-        session.policy = session.fresh_policy();
+        let mut session = Self {
+            work: Workspace::new(&engine, 1),
+            engine,
+            options,
+            exec,
+            state,
+            now: 0.0,
+            times: stats::BlockTimes::new(),
+            policy: None,
+            log: Log::new(),
+            last: None,
+            due: None,
+            done: None,
+        };
+        session.reset()?;
         Ok(session)
     }
 
@@ -263,12 +293,16 @@ impl Session {
         }
         let (plan, work) = self.start();
         let started = Instant::now();
-        self.exec.begin();
-        let done = self.state.compute(&mut self.exec, &self.engine, &self.options, &plan, probe);
-        self.exec.end();
+        let Self { exec, work: memory, engine, options, state, .. } = self;
+        let probe = probe.map(|probe| probe as _);
+        let mut blocks = [Some(Block { options, plan, state, probe, outcome: Ok(()) })];
+        exec.begin();
+        pipeline::compute(&mut Tools { exec, work: memory, engine }, &mut blocks);
+        exec.end();
+        let [block] = blocks;
+        let outcome = block.map_or(Ok(()), |block| block.outcome);
         self.ended(plan, work, started.elapsed());
-        done?;
-        Ok(Some(&self.state.frames))
+        outcome.map(|()| Some(self.state.frames.as_slice()))
     }
 
     /// Sets the time; whether a block is due.
@@ -318,12 +352,19 @@ impl Session {
     /// # Errors
     /// None that the session's creation would not have met.
     pub fn reset(&mut self) -> Result<()> {
+        self.forget();
+        let mut tools = Tools { exec: &mut self.exec, work: &mut self.work, engine: &self.engine };
+        self.state.reset(&mut tools, &self.options, self.engine.idle.view());
+        Ok(())
+    }
+
+    /// Forgets times and decisions.
+    fn forget(&mut self) {
         self.now = 0.0;
         self.times.clear();
         self.log.clear();
         self.policy = self.fresh_policy();
         self.last = None;
-        self.state.reset(&mut self.exec, &self.engine, &self.options)
     }
 
     /// Computes `blocks` blocks for nothing and starts anew, so that pages, caches and the CPU's clock are warm when the
@@ -352,11 +393,11 @@ impl Session {
     /// [`ErrorKind::Argument`] when there are fewer tokens than the idle clip has.
     pub fn reset_with_noise(&mut self, noise: Vec<f32>) -> Result<()> {
         let latent = self.engine.config.vae.latent;
-        if noise.len() < self.engine.idle.len() || !noise.len().is_multiple_of(latent) {
+        if noise.len() < self.engine.idle.values().len() || !noise.len().is_multiple_of(latent) {
             let message = format!("noise of {} values: whole tokens of {latent}, idle clip included", noise.len());
             return Err(Error::new(ErrorKind::Argument, message));
         }
-        self.state.noise = block::Noise::Given(noise);
+        self.state.noise = Noise::Given(noise);
         self.reset()
     }
 

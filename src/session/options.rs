@@ -88,7 +88,7 @@ impl Default for SessionOptions {
             seed: 0,
             threads: 1,
             core_mask: None,
-            sampler: Sampler::Midpoint(4),
+            sampler: Sampler::Midpoint4,
             governor: Governor::Off,
             gaze: None,
             gaze_control: GazeControl::Calibrated,
@@ -134,8 +134,9 @@ impl SessionOptions {
         }
         self.governor.check()?;
         match self.sampler {
-            Sampler::Midpoint(1 | 2 | 4) | Sampler::Euler(1..=64) if engine.flow.is_some() => Ok(()),
             Sampler::Single if engine.student.is_some() => Ok(()),
+            Sampler::Single => Err(unsupported(Sampler::Single, engine)),
+            _ if engine.flow.is_some() => Ok(()),
             other => Err(unsupported(other, engine)),
         }
     }
@@ -184,14 +185,10 @@ pub(super) fn unsupported(sampler: Sampler, engine: &Engine) -> Error {
             "the single-step sampler needs a bundle with a student network; this one has none (see `visavis inspect`)"
                 .to_owned()
         }
-        Sampler::Midpoint(1 | 2 | 4) | Sampler::Euler(1..=64) if engine.flow.is_none() => {
+        _ if engine.flow.is_none() => {
             format!("{sampler} needs the reference network, which this engine was loaded without: use the single step")
         }
-        Sampler::Single | Sampler::Midpoint(_) => format!("{sampler}: midpoint takes 1, 2 or 4 steps"),
-        Sampler::Euler(n) if (1..=64).contains(&n) => {
-            format!("{sampler}: its flow times have no caches in this session; make a session with that sampler")
-        }
-        Sampler::Euler(_) => format!("{sampler}: Euler takes 1 to 64 steps"),
+        _ => format!("{sampler}: its flow times have no caches in this session; make a session with that sampler"),
     })
 }
 

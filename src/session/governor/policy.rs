@@ -62,13 +62,13 @@ pub(in crate::session) struct Policy {
 impl Policy {
     /// A ladder from `best` down; `student` tells whether there is a single step.
     pub(in crate::session) fn new(budget: &Budget, best: Sampler, student: bool) -> Self {
-        let all = [Sampler::Midpoint(4), Sampler::Midpoint(2), Sampler::Midpoint(1), Sampler::Single];
+        let all = [Sampler::Midpoint4, Sampler::Midpoint2, Sampler::Midpoint1, Sampler::Single];
         let mut ladder = [best; RUNGS];
         let mut len = 1;
         for sampler in all {
             let usable = match sampler {
                 Sampler::Single => student,
-                Sampler::Midpoint(1) => budget.coarse || !student,
+                Sampler::Midpoint1 => budget.coarse || !student,
                 _ => true,
             };
             if usable && sampler.evaluations() < best.evaluations() {

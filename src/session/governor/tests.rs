@@ -19,9 +19,9 @@ struct Device {
 /// Milliseconds of a rung at full speed, and of a pass and of re-anchoring: as measured on one computer, scaled up.
 fn time(sampler: Sampler) -> f64 {
     match sampler {
-        Sampler::Midpoint(4) => 43.0,
-        Sampler::Midpoint(2) => 29.0,
-        Sampler::Midpoint(1) => 22.0,
+        Sampler::Midpoint4 => 43.0,
+        Sampler::Midpoint2 => 29.0,
+        Sampler::Midpoint1 => 22.0,
         _ => 13.0,
     }
 }
@@ -31,9 +31,9 @@ const ANCHOR: f64 = 15.0;
 /// Units of work as the governor sees them.
 fn work(sampler: Sampler) -> f64 {
     match sampler {
-        Sampler::Midpoint(4) => 121.0,
-        Sampler::Midpoint(2) => 71.0,
-        Sampler::Midpoint(1) => 46.0,
+        Sampler::Midpoint4 => 121.0,
+        Sampler::Midpoint2 => 71.0,
+        Sampler::Midpoint1 => 46.0,
         _ => 27.0,
     }
 }
@@ -46,7 +46,7 @@ impl Device {
     }
 
     fn standard() -> Self {
-        Self::new(Budget { milliseconds: BUDGET as f32, coarse: false }, Sampler::Midpoint(4), true)
+        Self::new(Budget { milliseconds: BUDGET as f32, coarse: false }, Sampler::Midpoint4, true)
     }
 
     /// One block on a device that is `slow` times slower than at full speed, with `stall` milliseconds of something else.
@@ -111,7 +111,7 @@ fn ladders() {
 fn a_fast_device_climbs_at_once_and_stays() {
     let mut device = Device::standard();
     assert_eq!(device.block(0.3, 0.0).sampler, Sampler::Single);
-    (0..500).for_each(|_| assert_eq!(device.block(0.3, 0.0).sampler, Sampler::Midpoint(4)));
+    (0..500).for_each(|_| assert_eq!(device.block(0.3, 0.0).sampler, Sampler::Midpoint4));
     assert_eq!((device.missed(), device.policy.stats().down), (0, 0));
     assert!(device.plans[10..].iter().all(|p| p.anchor), "there is time for re-anchoring");
 }
@@ -143,7 +143,7 @@ fn heat_that_comes_and_goes_misses_nothing_and_is_climbed_out_of() {
     }
     assert_eq!(device.missed(), 0);
     assert!(device.plans[800..1400].iter().all(|p| p.sampler == Sampler::Single), "the heat is on");
-    assert_eq!(device.plans.last().map(|p| p.sampler), Some(Sampler::Midpoint(4)), "and over");
+    assert_eq!(device.plans.last().map(|p| p.sampler), Some(Sampler::Midpoint4), "and over");
     let stats = device.policy.stats();
     assert!(stats.down <= 6 && stats.up <= 6, "{stats:?}: no hunting");
     assert!(stats.catch_up_passes >= 8, "slots caught up before the climb");
@@ -157,7 +157,7 @@ fn single_stalls_cost_quality_for_seconds_and_no_deadline() {
         device.block(0.8, if block % 400 == 399 { 45.0 } else { 0.0 });
     }
     assert_eq!(device.missed(), 0);
-    let best = device.plans.iter().filter(|p| p.sampler == Sampler::Midpoint(4)).count();
+    let best = device.plans.iter().filter(|p| p.sampler == Sampler::Midpoint4).count();
     let single = device.plans.iter().filter(|p| p.sampler == Sampler::Single).count();
     assert!(best > 2000 && single < 600, "{best} blocks on the best rung, {single} on the last");
     assert_eq!(device.policy.stats().held_blocks, 0);
@@ -184,7 +184,7 @@ fn what_cannot_keep_up_is_held_and_comes_back() {
     let held = device.plans.iter().filter(|p| p.hold != Hold::No).count();
     assert!(held > 700, "{held} blocks held");
     assert!(device.plans[900 + 65..].iter().all(|p| p.hold == Hold::No), "back within 8.5 s");
-    assert_eq!(device.plans.last().map(|p| p.sampler), Some(Sampler::Midpoint(4)));
+    assert_eq!(device.plans.last().map(|p| p.sampler), Some(Sampler::Midpoint4));
     assert!(device.missed() <= 8, "{} late blocks: the slow ones before it was held", device.missed());
     assert_eq!(device.policy.stats().missed as usize, device.missed());
 }
@@ -221,7 +221,7 @@ proptest! {
     /// Any times whatsoever, NaN and negative ones included, give plans of the ladder.
     #[test]
     fn any_times_are_survived(times in prop::collection::vec(any::<f64>(), 1..200)) {
-        let mut policy = Policy::new(&Budget::default(), Sampler::Midpoint(4), true);
+        let mut policy = Policy::new(&Budget::default(), Sampler::Midpoint4, true);
         for ms in times {
             let outlook = Outlook { rungs: [[10.0, 12.0]; 5], behind: [3; 5], pass: 2.0, anchor: 4.0 };
             let plan = policy.decide(&outlook);
