@@ -1,30 +1,36 @@
 //! Quantised bundles: made alike every time, loaded with checks, and close to what they were made from.
 
-#[cfg(feature = "cli")]
-#[path = "common/cli.rs"]
-mod cli;
 mod common;
 
-use common::{Inputs, golden_path, motion_of, tiny_f32, tiny_in};
-use visavis::bundle::{BundleFile, Contents, int16_activations};
-use visavis::engine::Engine;
-use visavis::error::ErrorKind;
-use visavis::frame::Sampler;
-use visavis::kernels::{Kernels, Scheme};
-use visavis::offline::Conversation;
-use visavis::quant::{Budget, Keep, Options, Scene, Teacher, quantise};
-use visavis::session::SessionOptions;
-use visavis::user::UserPath;
+use common::{Inputs, golden_path, motion_of, tiny, tiny_f32, tiny_in};
+use std::sync::Arc;
+use visavis::internals::bundle::{Contents, int16_activations};
+use visavis::internals::config::{GazeConfig, GazeCurve};
+use visavis::internals::kernels::{Kernels, Scheme};
+use visavis::internals::quant::{Budget, Keep, Options, Scene, Teacher, quantise};
+use visavis::internals::session::Anchoring;
+use visavis::{BundleFile, Engine, ErrorKind, Frame, GazeControl, Sampler, SessionOptions};
 
 fn options(scheme: Scheme, keep: &[Keep]) -> Options<'_> {
     Options { scheme, smallest: 0, keep, calibration: None, budget: None }
 }
 
+/// The tiny bundle with a calibration of gaze, whose free levels change every second or so.
+fn with_gaze() -> Arc<Engine> {
+    let gaze = GazeConfig {
+        guided: GazeCurve(vec![[0.0, -0.5], [1.0, 0.5]]),
+        unguided: GazeCurve(vec![[-1.0, -0.8], [1.0, 0.8]]),
+        student: Some(GazeCurve(vec![[-1.0, -0.25], [1.0, 0.75]])),
+        levels: vec![-0.3, 0.2, 0.9],
+        seconds: 1.0,
+    };
+    let bytes = BundleFile::open(golden_path("tiny.safetensors")).unwrap().with_gaze(&gaze).unwrap();
+    Engine::from_bytes(bytes, "calibrated").unwrap()
+}
+
 fn scene(blocks: usize) -> Scene {
     let inputs = Inputs::circling(4.0, 24_000);
-    let rows: String = inputs.path.iter().map(|(t, p)| format!("{t},{},{},{}\n", p.x, p.y, p.z)).collect();
-    let path = UserPath::parse(&format!("t,x,y,z\n{rows}")).unwrap();
-    Conversation::new(Some(inputs.agent), Some(inputs.user), Some(path)).unwrap().scene(blocks, Some(0.5)).unwrap()
+    Scene::new(Some(&inputs.agent), Some(&inputs.user), inputs.path, blocks, Some(0.5)).unwrap()
 }
 
 #[test]
@@ -54,6 +60,43 @@ fn blocks_stay_close_in_the_order_of_the_schemes() {
     }
 }
 
+/// What is measured is what a session does: the reference's free run has the bits of a plain session that is driven as any caller drives
+/// it, with free gaze, whose levels are drawn from the calibration, and with a target.
+#[test]
+fn the_teacher_runs_as_a_plain_session_does() {
+    let engine = with_gaze();
+    let inputs = Inputs::circling(6.0, 24_000);
+    let blocks = 30;
+    for (gaze, seed, sampler) in [
+        (None, 3, Sampler::Midpoint4),
+        (None, 4, Sampler::Midpoint4),
+        (Some(0.3), 3, Sampler::Midpoint2),
+        (None, 3, Sampler::Single),
+    ] {
+        let scene = Scene::new(Some(&inputs.agent), Some(&inputs.user), inputs.path.clone(), blocks, gaze).unwrap();
+        let teacher = Teacher::new(&engine, scene.clone(), sampler, seed, &mut None).unwrap();
+        let options = SessionOptions { seed, sampler, gaze, anchoring: Anchoring::Never, ..Default::default() };
+        let plain = motion_of(&engine, options.clone(), &inputs, blocks);
+        // The gaze of a frame is measured against the head as known by then; it does not steer.
+        let shown =
+            |frames: &[Frame]| -> Vec<Frame> { frames.iter().map(|f| Frame { gaze: None, ..f.clone() }).collect() };
+        let taught: Vec<_> = teacher.frames().cloned().collect();
+        assert_eq!(shown(&taught), shown(&plain), "{sampler}, seed {seed}, gaze {gaze:?}");
+        let channel = SessionOptions { gaze_control: GazeControl::Channel, ..options };
+        assert_ne!(shown(&motion_of(&engine, channel, &inputs, blocks)), shown(&plain), "the calibration is in it");
+        // A candidate that is forced onto what it would make anyway makes it.
+        assert_eq!(teacher.compare(&engine).unwrap().mean_mm(), 0.0);
+    }
+}
+
+/// One that is conditioned otherwise cannot be compared.
+#[test]
+fn another_calibration_is_refused() {
+    let teacher = Teacher::new(&with_gaze(), scene(2), Sampler::Single, 0, &mut None).unwrap();
+    let e = teacher.compare(&tiny()).unwrap_err();
+    assert!(e.kind() == ErrorKind::Argument && e.to_string().contains("calibration"), "{e}");
+}
+
 /// Rounding for the inputs that layers get: better blocks of the same size, and the same bytes every time.
 #[test]
 fn calibrated_rounding_loses_less() {
@@ -69,7 +112,7 @@ fn calibrated_rounding_loses_less() {
         let teacher = Teacher::new(&reference, scene(20), Sampler::Midpoint4, 5, &mut None).unwrap();
         let latents = |bytes: Vec<u8>| {
             let forced = teacher.compare(&Engine::from_bytes(bytes, "tiny").unwrap()).unwrap();
-            visavis::quant::sqnr_db(&forced.latents[0], &forced.latents[1])
+            visavis::internals::quant::sqnr_db(&forced.latents[0], &forced.latents[1])
         };
         let (plain, calibrated) = (latents(plain.bytes), latents(calibrated.bytes));
         println!("{scheme}: latents {plain:.2} dB, calibrated {calibrated:.2} dB");
@@ -202,7 +245,7 @@ fn a_bundle_of_halves_is_half_a_bundle() {
     let keep = ["flow.layers.0.fc1=f32".parse().unwrap()];
     let contents = |file: &BundleFile<'_>| Contents::of(file).unwrap().tensors;
     let before = contents(&file);
-    let bytes = |tensors: &[visavis::bundle::TensorInfo]| tensors.iter().map(|t| t.bytes).sum::<usize>();
+    let bytes = |tensors: &[visavis::internals::bundle::TensorInfo]| tensors.iter().map(|t| t.bytes).sum::<usize>();
     let halves = quantise(&file, &Options { smallest: 8192, ..options(Scheme::F16, &[]) }).unwrap().bytes;
     let halves = contents(&BundleFile::from_bytes(halves, "halves"));
     assert!(2 * bytes(&halves) <= bytes(&before), "{} of {}", bytes(&halves), bytes(&before));
@@ -263,26 +306,4 @@ fn a_budget_raises_layers_until_blocks_are_within_it() {
         "{:?}",
         none.schemes
     );
-}
-
-#[cfg(feature = "cli")]
-#[test]
-fn the_command_writes_whole_files_only() {
-    use cli::{Scratch, fails, names, succeeds};
-    let dir = Scratch::new("quantise");
-    let tiny = golden_path("tiny.safetensors");
-    let tiny = tiny.to_str().unwrap();
-    let out = dir.path("i8.safetensors");
-    let text = succeeds(&["quantize", tiny, out.to_str().unwrap(), "--scheme", "i8", "--keep", "*.fc1=f32"]);
-    assert!(text.contains("MB"), "{text}");
-    assert!(succeeds(&["inspect", out.to_str().unwrap()]).contains("quantised to i8"));
-
-    let again = dir.path("again.safetensors");
-    fails(1, &["quantize", out.to_str().unwrap(), again.to_str().unwrap(), "--scheme", "i8"]);
-    fails(1, &["quantize", out.to_str().unwrap(), out.to_str().unwrap(), "--scheme", "i4"]);
-    fails(1, &["quantize", "no/such.safetensors", again.to_str().unwrap(), "--scheme", "i8"]);
-    fails(2, &["quantize", tiny, again.to_str().unwrap(), "--scheme", "i3"]);
-    fails(2, &["quantize", tiny, again.to_str().unwrap(), "--scheme", "i8", "--auto", "-1"]);
-    fails(1, &["quantize", tiny, dir.path("no/folder/x").to_str().unwrap(), "--scheme", "i8"]);
-    assert_eq!(names(dir.path("i8.safetensors").parent().unwrap()), ["i8.safetensors"]);
 }

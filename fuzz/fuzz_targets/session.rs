@@ -6,9 +6,8 @@ use arbitrary::{Arbitrary, Unstructured};
 use glam::Vec3;
 use libfuzzer_sys::fuzz_target;
 use std::cell::RefCell;
-use visavis::error::ErrorKind;
-use visavis::frame::{Root, Sampler};
-use visavis::session::{Anchoring, Budget, Governor, Session, SessionOptions};
+use visavis::{Budget, ErrorKind, Governor, Root, Sampler, Session, SessionOptions};
+use visavis::internals::session::Anchoring;
 use visavis_fuzz::{engine, student};
 
 thread_local! {
@@ -58,10 +57,10 @@ enum Step {
 fn sampler(i: u8) -> Sampler {
     match i % 6 {
         0 => Sampler::Midpoint4,
-        1 => Sampler::Midpoint(i / 6),
+        1 => Sampler::Midpoint1,
         // Mostly few steps.
-        2 if i < 252 => Sampler::Euler(i / 6 % 4),
-        2 => Sampler::Euler(i - 190),
+        2 if i < 252 => Sampler::euler(1 + i / 6 % 4).expect("1 to 4 steps"),
+        2 => Sampler::euler(i - 190).expect("62 steps and more"),
         3 => Sampler::Midpoint2,
         _ => Sampler::Single,
     }
@@ -121,7 +120,7 @@ fn drive(session: &mut Session, u: &mut Unstructured) {
 /// Takes a step; returns the number of blocks that were computed.
 fn take(session: &mut Session, step: Step, next: &mut Option<u64>) -> u32 {
     let mut sound = [0.0f32; 4096];
-    let typed = |result: visavis::error::Result<()>| {
+    let typed = |result: visavis::Result<()>| {
         if let Err(e) = result {
             assert!(matches!(e.kind(), ErrorKind::Argument | ErrorKind::Audio), "{e}");
         }

@@ -26,6 +26,7 @@
 
 mod anchor;
 mod block;
+#[cfg(feature = "quant")]
 mod forcing;
 mod gaze;
 mod governor;
@@ -39,6 +40,7 @@ mod stats;
 mod team;
 mod tools;
 
+#[cfg(feature = "quant")]
 pub(crate) use forcing::MadeBlock;
 pub use gaze::GazeControl;
 pub use governor::{Budget, Decision, Governor, GovernorStats, Hold, Plan};
@@ -60,6 +62,24 @@ use state::BlockState;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tools::{Tools, Workspace};
+
+impl Engine {
+    /// Starts a session; all memory that it will need is taken here.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] when an option is out of range or the bundle cannot do it.
+    pub fn session(self: &Arc<Self>, options: SessionOptions) -> Result<Session> {
+        Session::new(Arc::clone(self), options)
+    }
+
+    /// What it takes to step several sessions of this engine together, on `threads` threads (1 or 2): [`Team`] tells how.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] for another number of threads; [`ErrorKind::Io`] when the second one cannot be started.
+    pub fn team(self: &Arc<Self>, threads: usize) -> Result<Team> {
+        Team::new(Arc::clone(self), threads)
+    }
+}
 
 /// All mutable state of one conversation.
 ///
