@@ -8,8 +8,8 @@ use visavis::internals::bundle::{Contents, int16_activations};
 use visavis::internals::config::{GazeConfig, GazeCurve};
 use visavis::internals::kernels::{Kernels, Scheme};
 use visavis::internals::quant::{Budget, Keep, Options, Scene, Teacher, quantise};
-use visavis::internals::session::Anchoring;
-use visavis::{BundleFile, Engine, ErrorKind, Frame, GazeControl, Sampler, SessionOptions};
+use visavis::internals::session::{Anchoring, Diagnostics, GazeControl};
+use visavis::{BundleFile, Engine, ErrorKind, Frame, Sampler, SessionOptions};
 
 fn options(scheme: Scheme, keep: &[Keep]) -> Options<'_> {
     Options { scheme, smallest: 0, keep, calibration: None, budget: None }
@@ -75,14 +75,16 @@ fn the_teacher_runs_as_a_plain_session_does() {
     ] {
         let scene = Scene::new(Some(&inputs.agent), Some(&inputs.user), inputs.path.clone(), blocks, gaze).unwrap();
         let teacher = Teacher::new(&engine, scene.clone(), sampler, seed, &mut None).unwrap();
-        let options = SessionOptions { seed, sampler, gaze, anchoring: Anchoring::Never, ..Default::default() };
+        let options =
+            SessionOptions { seed, sampler, gaze, diagnostics: Anchoring::Never.into(), ..Default::default() };
         let plain = motion_of(&engine, options.clone(), &inputs, blocks);
         // The gaze of a frame is measured against the head as known by then; it does not steer.
         let shown =
             |frames: &[Frame]| -> Vec<Frame> { frames.iter().map(|f| Frame { gaze: None, ..f.clone() }).collect() };
         let taught: Vec<_> = teacher.frames().cloned().collect();
         assert_eq!(shown(&taught), shown(&plain), "{sampler}, seed {seed}, gaze {gaze:?}");
-        let channel = SessionOptions { gaze_control: GazeControl::Channel, ..options };
+        let channel = Diagnostics { gaze_control: GazeControl::Channel, ..options.diagnostics };
+        let channel = SessionOptions { diagnostics: channel, ..options };
         assert_ne!(shown(&motion_of(&engine, channel, &inputs, blocks)), shown(&plain), "the calibration is in it");
         // A candidate that is forced onto what it would make anyway makes it.
         assert_eq!(teacher.compare(&engine).unwrap().mean_mm(), 0.0);

@@ -85,7 +85,7 @@ impl Teacher {
             seed,
             sampler,
             gaze: scene.gaze(),
-            anchoring: Anchoring::Never,
+            diagnostics: Anchoring::Never.into(),
             ..SessionOptions::default()
         };
         let mut session = Session::listened(Arc::clone(engine), options.clone(), activations.take())?;

@@ -70,7 +70,7 @@ impl Block<'_> {
     pub(super) fn begin(&mut self, engine: &Engine) {
         let Self { options, plan, state, probe, .. } = self;
         let gaze = engine.config.gaze.as_ref();
-        let gaze = options.gaze_control.cue(gaze, options.gaze, plan.sampler, options.seed, state.block);
+        let gaze = options.diagnostics.gaze_control.cue(gaze, options.gaze, plan.sampler, options.seed, state.block);
         self.outcome = state.inputs.prepare(state.block, &state.motion.root(), gaze, probe);
         if self.outcome.is_err() {
             return;

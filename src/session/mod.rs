@@ -9,6 +9,7 @@
 //! | `poll` | session time to blocks, starting anew |
 //! | `settings` | what may be set while it runs, and the governor's decisions |
 //! | `options` | what a session is made with |
+//! | `diagnostics` | what measurements and tests change about it |
 //! | `inputs` | voices and head positions to the conditioning of a block |
 //! | `gaze` | the wanted gaze to the gaze channel, free gaze included |
 //! | `state` | all that changes from block to block |
@@ -28,6 +29,7 @@
 
 mod anchor;
 mod block;
+mod diagnostics;
 #[cfg(feature = "quant")]
 mod forcing;
 mod gaze;
@@ -44,18 +46,19 @@ mod stats;
 mod team;
 mod tools;
 
+pub use diagnostics::{Anchoring, Diagnostics, HistoryTime};
 #[cfg(feature = "quant")]
 pub(crate) use forcing::MadeBlock;
 pub use gaze::GazeControl;
 pub use governor::{Budget, Decision, Governor, GovernorStats, Hold, Plan};
-pub use options::{Anchoring, HistoryTime, SessionOptions};
+pub use options::SessionOptions;
 pub use probe::Probe;
 pub use stats::{Delays, InputStats, SessionStats};
 pub use team::Team;
 
 use crate::audio::Voice;
 use crate::engine::Engine;
-use crate::error::Result;
+use crate::error::{Error, ErrorKind, Result};
 use crate::frame::Frame;
 use crate::kernels::Exec;
 use glam::Vec3;
@@ -176,11 +179,11 @@ impl Session {
 
     /// The frames of the last block, or `None` before the first.
     pub fn frames(&self) -> Option<&[Frame]> {
-        (self.state.block > self.options.first_block).then_some(&self.state.frames)
+        (self.state.block > self.options.diagnostics.first_block).then_some(&self.state.frames)
     }
 
     /// The kernel's ids of the threads that this session owns and computes on, for performance hints: the second
-    /// thread's where there is one. The thread that calls [`Session::poll`] computes too ([`crate::par::current_thread_id`]).
+    /// thread's where there is one. The thread that calls [`Session::poll`] computes too ([`crate::threads::current_thread_id`]).
     pub fn worker_thread_ids(&self) -> impl Iterator<Item = u32> {
         self.exec.pool().helper_id().into_iter()
     }
@@ -188,7 +191,7 @@ impl Session {
     /// Block times, delays and counters so far.
     pub fn stats(&self) -> SessionStats {
         SessionStats {
-            blocks: self.state.block - self.options.first_block,
+            blocks: self.state.block - self.options.diagnostics.first_block,
             block_ms: self.times.percentiles(),
             delays: self.state.inputs.delays(&self.engine.config),
             inputs: self.state.inputs.stats(),
@@ -215,4 +218,8 @@ impl std::fmt::Debug for Session {
         let name = &self.engine.config.name;
         f.debug_struct("Session").field("model", name).field("blocks", &self.state.block).finish_non_exhaustive()
     }
+}
+
+fn argument(message: impl Into<String>) -> Error {
+    Error::new(ErrorKind::Argument, message)
 }

@@ -28,6 +28,7 @@ impl Session {
     ///
     /// # Errors
     /// As [`Session::poll`].
+    #[doc(hidden)]
     pub fn poll_with(&mut self, now: f64, probe: Option<&mut dyn Probe>) -> Result<Option<&[Frame]>> {
         if !self.is_due(now)? {
             return Ok(None);
@@ -82,8 +83,7 @@ impl Session {
         (self.state.block * BLOCK_FRAMES as u64) as f64 / f64::from(FPS)
     }
 
-    /// Starts anew, as if just made with the current options: same seed, same bits. Time starts at 0 again (or at that of
-    /// [`SessionOptions::first_block`]).
+    /// Starts anew, as if just made with the current options: same seed, same bits. Time starts at 0 again.
     ///
     /// # Errors
     /// None that the session's creation would not have met.
@@ -121,6 +121,7 @@ impl Session {
     ///
     /// # Errors
     /// [`ErrorKind::Argument`] when there are fewer tokens than the idle clip has.
+    #[doc(hidden)]
     pub fn reset_with_noise(&mut self, noise: Vec<f32>) -> Result<()> {
         let latent = self.engine.config.vae.latent;
         if noise.len() < self.engine.idle.values().len() || !noise.len().is_multiple_of(latent) {

@@ -7,14 +7,14 @@ use crate::frame::Sampler;
 
 impl Session {
     /// Sets the gaze target, 0 (averted) to 1 (sustained eye contact), or `None` for free gaze: levels of recorded conversations,
-    /// another one every now and then, where the bundle was calibrated ([`GazeControl`]), else what the model finds natural.
+    /// another one every now and then, where the bundle was calibrated, else what the model finds natural.
     /// Takes effect with the next block. The first target takes the memory of its guidance branch, a copy of some megabytes.
     ///
     /// # Errors
     /// [`ErrorKind::Argument`] outside -1 to 1.
     pub fn set_gaze(&mut self, target: Option<f32>) -> Result<()> {
         options::check_gaze(target)?;
-        if self.options.gaze_control.guides(target) {
+        if self.options.diagnostics.gaze_control.guides(target) {
             self.state.generator.open_gaze();
         }
         self.options.gaze = target;
@@ -108,7 +108,7 @@ impl Session {
         if let Some((plan, work, milliseconds)) = self.last.take() {
             policy.observe(&plan, milliseconds, work);
         }
-        let branches = if self.options.gaze_control.guides(self.options.gaze) { 3 } else { 2 };
+        let branches = if self.options.diagnostics.gaze_control.guides(self.options.gaze) { 3 } else { 2 };
         let outlook = self.state.outlook(policy.ladder(), branches);
         let plan = policy.decide(&outlook);
         let rung = policy.ladder().iter().position(|s| *s == plan.sampler).unwrap_or(0);

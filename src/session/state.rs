@@ -53,7 +53,7 @@ impl BlockState {
     pub(super) fn new(exec: &mut Exec, engine: &Engine, options: &SessionOptions) -> Result<Self> {
         let generator_options = GeneratorOptions {
             sampler: options.sampler,
-            dtype: options.cache,
+            dtype: options.diagnostics.cache,
             clean_history: options.clean_history(engine),
         };
         let condition = Condition::absent(engine.layout());
@@ -61,12 +61,12 @@ impl BlockState {
         let generator = Generator::new(exec, engine.nets(), &condition, generator_options);
         exec.end();
         let mut generator = generator?;
-        if options.gaze_control.guides(options.gaze) {
+        if options.diagnostics.gaze_control.guides(options.gaze) {
             generator.open_gaze();
         }
         let rig = &engine.config.rig;
         let mut motion = pose::Decoder::new(engine.kernels, rig, engine.config.pose.radius);
-        if options.bridge && engine.config.session.bridge > 0.0 {
+        if options.diagnostics.bridge && engine.config.session.bridge > 0.0 {
             motion = motion.with_bridge(rig, engine.config.session.bridge);
         }
         if options.guard {
@@ -79,7 +79,7 @@ impl BlockState {
         Ok(Self {
             inputs: Inputs::new(engine, options)?,
             generator,
-            decoder: engine.decoder.state(options.cache),
+            decoder: engine.decoder.state(options.diagnostics.cache),
             anchor: Anchor::new(engine, options),
             motion,
             work: Work::new(&engine.config),
@@ -98,7 +98,7 @@ impl BlockState {
     /// Back to the start: `idle`, latents of the idle clip, as history, the agent where the options put it.
     pub(super) fn reset(&mut self, tools: &mut Tools<'_>, options: &SessionOptions, idle: Standardised<&[f32]>) {
         let engine = tools.engine;
-        self.block = options.first_block;
+        self.block = options.diagnostics.first_block;
         self.inputs.reset(self.block);
         self.generator.reset(self.block);
         self.decoder.reset(self.block);

@@ -98,12 +98,12 @@ impl Device {
 fn ladders() {
     let ladder =
         |best, student, coarse| Policy::new(&Budget { milliseconds: 100.0, coarse }, best, student).ladder().to_vec();
-    use Sampler::{Euler, Midpoint, Single};
-    assert_eq!(ladder(Midpoint(4), true, false), [Midpoint(4), Midpoint(2), Single]);
-    assert_eq!(ladder(Midpoint(4), true, true), [Midpoint(4), Midpoint(2), Midpoint(1), Single]);
-    assert_eq!(ladder(Midpoint(4), false, false), [Midpoint(4), Midpoint(2), Midpoint(1)]);
-    assert_eq!(ladder(Midpoint(2), true, false), [Midpoint(2), Single]);
-    assert_eq!(ladder(Euler(64), true, true).len(), 5);
+    use Sampler::{Midpoint1, Midpoint2, Midpoint4, Single};
+    assert_eq!(ladder(Midpoint4, true, false), [Midpoint4, Midpoint2, Single]);
+    assert_eq!(ladder(Midpoint4, true, true), [Midpoint4, Midpoint2, Midpoint1, Single]);
+    assert_eq!(ladder(Midpoint4, false, false), [Midpoint4, Midpoint2, Midpoint1]);
+    assert_eq!(ladder(Midpoint2, true, false), [Midpoint2, Single]);
+    assert_eq!(ladder(Sampler::euler(64).unwrap(), true, true).len(), 5);
     assert_eq!(ladder(Single, true, false), [Single]);
 }
 
