@@ -1,9 +1,10 @@
-//! Latents and pose features have two scales: the networks', and that of metres and radians. Each is a type of its own, and a
-//! [`Normaliser`] is the only way between them.
+//! Latents and pose features have two scales: the networks', and that of metres and radians. Each
+//! is a type of its own, and a [`Normaliser`] is the only way between them.
 
 use crate::error::{Error, ErrorKind, Result};
 
-/// Values in the networks' scale: mean 0 and standard deviation 1 in every channel of the training data.
+/// Values in the networks' scale: mean 0 and standard deviation 1 in every channel of the training
+/// data.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Standardised<B = Vec<f32>>(B);
 

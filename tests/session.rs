@@ -4,7 +4,7 @@ mod common;
 
 use common::{Inputs, motion, poll_blocks, run, tiny};
 use glam::Vec3;
-use visavis::internals::session::Diagnostics;
+use visavis::internals::session::{Diagnostics, Probe};
 use visavis::{BLOCK_FRAMES, ErrorKind, FPS, Frame, Sampler, Session, SessionOptions};
 
 const BLOCKS: usize = 30;
@@ -276,5 +276,43 @@ fn warming_up_leaves_no_trace() {
         assert_eq!(session.worker_thread_ids().count(), 1);
         let refused = tiny().session(SessionOptions { core_mask: Some(0), ..options() });
         assert_eq!(refused.unwrap_err().kind(), ErrorKind::Argument);
+    }
+}
+
+/// Counts what is told of features, block by block.
+#[derive(Default)]
+struct Decoded(Vec<u64>);
+
+impl Probe for Decoded {
+    fn stage(&mut self, block: u64, name: &'static str, values: &[f32]) {
+        if name == "decoded" {
+            assert!(values.iter().all(|v| v.is_finite()));
+            self.0.push(block);
+        }
+    }
+}
+
+/// Numbers that are no latent: the guard answers for the block, nothing of them stays, and motion comes back.
+#[test]
+fn an_unusable_latent_is_a_block_without_features() {
+    let engine = tiny();
+    let (idle, latent) = (engine.idle_blocks(), engine.config().vae.latent);
+    for (sampler, rubbish) in [(Sampler::Midpoint4, f32::NAN), (Sampler::Midpoint2, 1e30), (Sampler::Single, f32::NAN)]
+    {
+        let mut noise = vec![0.1; (idle + 5) * latent];
+        noise.extend(vec![rubbish; latent]);
+        let mut session = engine.session(SessionOptions { sampler, ..Default::default() }).unwrap();
+        session.reset_with_noise(noise).unwrap();
+        let (mut decoded, mut frames) = (Decoded::default(), Vec::new());
+        for _ in 0..14 {
+            let now = session.next_due();
+            frames.extend_from_slice(session.poll_with(now, Some(&mut decoded)).unwrap().unwrap());
+        }
+        let expected: Vec<u64> = (0..14).filter(|block| *block != 5).collect();
+        assert_eq!(decoded.0, expected, "{sampler}");
+        assert!(frames[20..24].iter().all(|f| f.held == 1.0), "{sampler}");
+        assert!(frames.iter().flat_map(|f| &f.global).all(|t| t.position.is_finite() && t.rotation.is_finite()));
+        assert_eq!(frames.last().unwrap().held, 0.0, "{sampler}");
+        assert_eq!(session.stats().guard.non_finite, 4, "{sampler}");
     }
 }

@@ -9,10 +9,12 @@ use crate::pose;
 use crate::vae::RoundTrip;
 
 impl Engine {
-    /// The whole blocks of `frames` through encoder and decoder, as decoded: borders are not bridged and feet not held.
+    /// The whole blocks of `frames` through encoder and decoder, as decoded: borders are not
+    /// bridged and feet not held.
     ///
     /// # Errors
-    /// [`State`](crate::ErrorKind::State) without the encoder; those of decoding values that are not finite.
+    /// [`State`](crate::ErrorKind::State) without the encoder; those of decoding values that are
+    /// not finite.
     #[doc(hidden)]
     pub fn round_trip(&self, frames: &[Frame]) -> Result<Vec<Frame>> {
         let rig = &self.config.rig;

@@ -18,18 +18,21 @@ use crate::normaliser::Standardised;
 /// What a generator is made with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GeneratorOptions {
-    /// The sampler that is meant to be used; Euler steps outside the grid of eighths get slots of their own.
+    /// The sampler that is meant to be used; Euler steps outside the grid of eighths get slots of
+    /// their own.
     pub sampler: Sampler,
     /// Storage of the caches.
     pub dtype: KvDtype,
-    /// Whether late evaluations of the reference network see history nearly clean; `None` imputes it throughout.
+    /// Whether late evaluations of the reference network see history nearly clean; `None` imputes
+    /// it throughout.
     pub clean_history: Option<CleanHistory>,
 }
 
 /// The history of one session, and the caches of the reference network and its student over it.
 ///
-/// Slots of both networks are numbered through, those of the student last. A sampler that has not been used for a while finds its
-/// slots behind; they catch up in batched passes when it is used again.
+/// Slots of both networks are numbered through, those of the student last. A sampler that has not
+/// been used for a while finds its slots behind; they catch up in batched passes when it is used
+/// again.
 #[derive(Debug)]
 pub struct Generator {
     pub(super) history: History,
@@ -105,7 +108,8 @@ impl Generator {
         self.history.replace(token, z.values());
     }
 
-    /// Takes the memory that tokens with a gaze target need, which the first of them would take otherwise.
+    /// Takes the memory that tokens with a gaze target need, which the first of them would take
+    /// otherwise.
     pub fn open_gaze(&mut self) {
         self.reference.iter_mut().for_each(Slots::open_gaze);
     }
@@ -115,7 +119,8 @@ impl Generator {
         self.reference.iter().chain(&self.student).map(Slots::cache_bytes).sum()
     }
 
-    /// Appends a known latent without sampling, for the start of a session. `noise` fills the token's noise, given its index.
+    /// Appends a known latent without sampling, for the start of a session. `noise` fills the
+    /// token's noise, given its index.
     pub fn append(&mut self, condition: &Condition, z: Standardised<&[f32]>, noise: impl FnOnce(u64, &mut [f32])) {
         let token = self.history.len();
         noise(token, self.history.begin(condition));
@@ -149,7 +154,8 @@ impl Generator {
         }
     }
 
-    /// Computes a piece of slot `slot` anew from the history; returns the token to go on with, or `None` when the slot is through.
+    /// Computes a piece of slot `slot` anew from the history; returns the token to go on with, or
+    /// `None` when the slot is through.
     pub fn rewrite(&mut self, tools: &mut Tools<'_>, slot: usize, stretch: Stretch) -> Option<u64> {
         let (slots, net, slot, history) = self.locate(tools.nets, slot)?;
         slots.rewrite(tools, net, history, slot, stretch)
@@ -184,8 +190,8 @@ impl Generator {
         slots.catch_up(tools, net, history, slot)
     }
 
-    /// Rows of one evaluation of `sampler` for the next token, with or without a gaze target; `None` where slots must catch up first
-    /// or the sampler is not supported.
+    /// Rows of one evaluation of `sampler` for the next token, with or without a gaze target;
+    /// `None` where slots must catch up first or the sampler is not supported.
     pub fn rows(&self, sampler: Sampler, gaze: bool) -> Option<usize> {
         if !self.supports(sampler) || self.visits(sampler).any(|slot| self.behind(slot) > 1) {
             return None;
@@ -204,9 +210,10 @@ impl Generator {
         }
     }
 
-    /// Starts making the next token with `sampler` from its noise, which `noise` fills, given the token's index; [`super::sample`]
-    /// makes it. A sampler that is not supported falls back to the midpoint rule, or without the reference network to a single
-    /// step; sessions refuse such samplers before.
+    /// Starts making the next token with `sampler` from its noise, which `noise` fills, given the
+    /// token's index; [`super::sample`] makes it. A sampler that is not supported falls back to the
+    /// midpoint rule, or without the reference network to a single step; sessions refuse such
+    /// samplers before.
     pub fn begin(
         &mut self,
         sampler: Sampler,
@@ -222,8 +229,8 @@ impl Generator {
         self.making.begin(sampler, guidance, self.history.eps(token), slots.into_iter().flatten());
     }
 
-    /// Evaluates the network of `sampler` once for the token that would be next and keeps nothing of it: what a step takes
-    /// can be measured without making motion.
+    /// Evaluates the network of `sampler` once for the token that would be next and keeps nothing
+    /// of it: what a step takes can be measured without making motion.
     pub fn rehearse(&mut self, tools: &mut Tools<'_>, sampler: Sampler, condition: &Condition) {
         self.history.begin(condition).fill(0.0);
         self.making.z.fill(0.0);

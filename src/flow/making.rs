@@ -32,7 +32,8 @@ impl Making {
         }
     }
 
-    /// A token from its noise; `slots` are those of the evaluations, none of a single step, which has slot 0.
+    /// A token from its noise; `slots` are those of the evaluations, none of a single step, which
+    /// has slot 0.
     pub(super) fn begin(
         &mut self,
         sampler: Sampler,
@@ -49,7 +50,8 @@ impl Making {
 
     /// Goes on with what evaluation `i` predicted: `x1` of each branch.
     ///
-    /// Midpoint: `z_mid = z + h/2 v(z, tau)`, `z += h v(z_mid, tau + h/2)` with `h = 1 / steps`. Euler: `z += v(z, tau) / steps`.
+    /// Midpoint: `z_mid = z + h/2 v(z, tau)`, `z += h v(z_mid, tau + h/2)` with `h = 1 / steps`.
+    /// Euler: `z += v(z, tau) / steps`.
     pub(super) fn step(&mut self, i: usize, x1: &[f32]) {
         if self.sampler == Sampler::Single {
             return self.z.copy_from_slice(x1);
@@ -70,7 +72,8 @@ impl Making {
     }
 }
 
-/// `z = start + h v` with the velocity `v = (x1 - z) / (1 - tau)` at `z`, where the network was evaluated.
+/// `z = start + h v` with the velocity `v = (x1 - z) / (1 - tau)` at `z`, where the network was
+/// evaluated.
 fn advance(z: &mut [f32], start: &[f32], x1: &[f32], h: f32, tau: f32) {
     let k = h / (1.0 - tau);
     for ((z, start), x1) in z.iter_mut().zip(start).zip(x1) {

@@ -1,9 +1,11 @@
-//! The flow-matching generator (SARAH 3.3): conditioning goes in, the latent of the next block comes out.
+//! The flow-matching generator (SARAH 3.3): conditioning goes in, the latent of the next block
+//! comes out.
 //!
-//! A latent is carried from noise to data along `z^tau = tau z + (1 - tau) eps`; the network predicts the end `z` (x1
-//! prediction) from `z^tau`, its history and the conditioning. History enters by imputation at the same flow time, and
-//! because a token's noise is fixed for its life, the keys and values of finished tokens at one flow time (a *slot*)
-//! never change: each slot keeps its own ring cache and a pass runs only the newest finished token and the new one.
+//! A latent is carried from noise to data along `z^tau = tau z + (1 - tau) eps`; the network
+//! predicts the end `z` (x1 prediction) from `z^tau`, its history and the conditioning. History
+//! enters by imputation at the same flow time, and because a token's noise is fixed for its life,
+//! the keys and values of finished tokens at one flow time (a *slot*) never change: each slot keeps
+//! its own ring cache and a pass runs only the newest finished token and the new one.
 //!
 //! | file | what |
 //! |---|---|

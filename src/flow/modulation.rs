@@ -1,5 +1,5 @@
-//! Modulation vectors of flow times (AdaLN-Zero; Peebles and Xie 2023): they depend on the flow time alone, so they are tabulated and `6 d^2` weights
-//! per layer stay out of the hot path.
+//! Modulation vectors of flow times (AdaLN-Zero; Peebles and Xie 2023): they depend on the flow
+//! time alone, so they are tabulated and `6 d^2` weights per layer stay out of the hot path.
 
 use crate::bundle::Tensors;
 use crate::config::FlowConfig;
@@ -28,8 +28,8 @@ pub(super) struct TauWeights {
 
 /// AdaLN-Zero shift, scale and gate of every layer for a list of flow times.
 ///
-/// One row of the table per flow time: six vectors per layer (shift, 1 + scale, gate of the attention, then of the feed-forward), then the
-/// final shift and 1 + scale.
+/// One row of the table per flow time: six vectors per layer (shift, 1 + scale, gate of the
+/// attention, then of the feed-forward), then the final shift and 1 + scale.
 #[derive(Debug)]
 pub struct Modulation {
     times: Vec<f32>,

@@ -15,9 +15,11 @@ pub struct FlowNet {
     config: FlowConfig,
     latent: usize,
     layout: ConditionLayout,
-    /// `W_in[:, latent part] W_latent`: the latent's embedding folded into the input projection, `[d, latent]`.
+    /// `W_in[:, latent part] W_latent`: the latent's embedding folded into the input projection,
+    /// `[d, latent]`.
     input_latent: Matrix,
-    /// The rest of the input projection, `[d, embeddings + 4 flags]`; its bias holds the latent embedding's too.
+    /// The rest of the input projection, `[d, embeddings + 4 flags]`; its bias holds the latent
+    /// embedding's too.
     input_rest: Matrix,
     /// `input_rest` of a token with everything absent.
     unconditional: Vec<f32>,
@@ -32,7 +34,8 @@ pub struct FlowNet {
 }
 
 impl FlowNet {
-    /// Reads `{prefix}.*` (`flow` or `student`). With `times` the modulation weights are not kept, but a table of these flow times.
+    /// Reads `{prefix}.*` (`flow` or `student`). With `times` the modulation weights are not kept,
+    /// but a table of these flow times.
     ///
     /// # Errors
     /// As [`Tensors::f32`].
@@ -120,7 +123,8 @@ impl FlowNet {
         embeds.into_iter().chain([&self.embed_gaze, &self.input_rest]).map(Matrix::bytes).sum()
     }
 
-    /// Bytes of what flow times are turned into modulation with, read when a session starts: packed matrices, or a table.
+    /// Bytes of what flow times are turned into modulation with, read when a session starts: packed
+    /// matrices, or a table.
     pub fn modulation_bytes(&self) -> usize {
         self.modulator.bytes()
     }
@@ -150,9 +154,9 @@ impl FlowNet {
         exec.linear(&self.input_latent, z, rows, y, Epilogue::Store);
     }
 
-    /// Input of a token's conditioning, `out` `[2, d]`: without a guided gaze target, and with it (the same if there is none, or
-    /// if it is not guided towards).
-    /// `embedded` is scratch of `2 x rest_width`.
+    /// Input of a token's conditioning, `out` `[2, d]`: without a guided gaze target, and with it
+    /// (the same if there is none, or if it is not guided towards). `embedded` is scratch of `2 x
+    /// rest_width`.
     pub(super) fn project(&self, exec: &mut Exec, condition: &Condition, embedded: &mut [f32], out: &mut [f32]) {
         let (c, rest) = (&self.config, self.rest_width());
         let layout = condition.layout();
@@ -197,7 +201,8 @@ impl FlowNet {
     /// Modulation of the given flow times.
     ///
     /// # Errors
-    /// [`crate::error::ErrorKind::Argument`] when the weights for it were not kept, and these are not the times of the table in their place.
+    /// [`crate::error::ErrorKind::Argument`] when the weights for it were not kept, and these are
+    /// not the times of the table in their place.
     pub fn modulation(&self, exec: &mut Exec, times: &[f32]) -> Result<Arc<Modulation>> {
         self.modulator.modulation(exec, &self.config, times)
     }

@@ -1,5 +1,5 @@
-//! Passes through a flow network: tokens of one generator, or of several side by side, go through each layer together, which
-//! reads its weights once.
+//! Passes through a flow network: tokens of one generator, or of several side by side, go through
+//! each layer together, which reads its weights once.
 
 use super::history::History;
 use super::nets::Nets;
@@ -10,7 +10,8 @@ use crate::nn::Pass;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Rows of a pass that generators share, at most: as many as a product of the kernels takes at once.
+/// Rows of a pass that generators share, at most: as many as a product of the kernels takes at
+/// once.
 pub const SHARED_ROWS: usize = 16;
 
 /// Working memory of passes through networks of one size.
@@ -65,8 +66,9 @@ impl Work {
         self.run(exec, net, &mut [part], |part| Some(part.borrowed()));
     }
 
-    /// Runs a pass of the parts of all `members` that have one. They are of slots at the same flow times ([`Slots::alike`]), and
-    /// several of them have [`SHARED_ROWS`] rows at most. Predictions are in [`Slots::x1`] afterwards.
+    /// Runs a pass of the parts of all `members` that have one. They are of slots at the same flow
+    /// times ([`Slots::alike`]), and several of them have [`SHARED_ROWS`] rows at most. Predictions
+    /// are in [`Slots::x1`] afterwards.
     pub(super) fn run<M>(
         &mut self,
         exec: &mut Exec,

@@ -1,4 +1,5 @@
-//! Projected conditioning of the last tokens: the same for every slot of a network, so it is computed once per token.
+//! Projected conditioning of the last tokens: the same for every slot of a network, so it is
+//! computed once per token.
 
 /// A ring of tokens, `[token % capacity][2][width]`: without a guided gaze target, and with it.
 #[derive(Debug)]

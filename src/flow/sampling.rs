@@ -43,11 +43,12 @@ impl Generator {
     }
 }
 
-/// Samples the begun tokens of all `members` that have a generator, and appends each to its history; `seen` is called for each member
-/// after each of its evaluations ([`Generator::x1`]).
+/// Samples the begun tokens of all `members` that have a generator, and appends each to its
+/// history; `seen` is called for each member after each of its evaluations ([`Generator::x1`]).
 ///
-/// They have begun with one sampler. Several of them are alike for it ([`Generator::alike`]), and their rows ([`Generator::rows`]) add up to
-/// [`super::SHARED_ROWS`] at most. What each makes is what it makes by itself, bit for bit.
+/// They have begun with one sampler. Several of them are alike for it ([`Generator::alike`]), and
+/// their rows ([`Generator::rows`]) add up to [`super::SHARED_ROWS`] at most. What each makes is
+/// what it makes by itself, bit for bit.
 pub fn sample<M>(
     tools: &mut Tools<'_>,
     members: &mut [M],

@@ -3,7 +3,8 @@
 use crate::config::CleanHistory;
 use crate::frame::Sampler;
 
-/// The grid of the midpoint rules and of Euler with 1, 2, 4 or 8 steps: every session has slots for it.
+/// The grid of the midpoint rules and of Euler with 1, 2, 4 or 8 steps: every session has slots for
+/// it.
 const GRID: u8 = 8;
 
 /// A flow time, a fraction in lowest terms: equal times are equal fractions.
@@ -23,7 +24,8 @@ impl FlowTime {
         Self { numerator: numerator / a, denominator: denominator / a }
     }
 
-    /// That of evaluation `i` of `sampler`: the midpoint rule looks at its steps' starts and middles, Euler's at their starts.
+    /// That of evaluation `i` of `sampler`: the midpoint rule looks at its steps' starts and
+    /// middles, Euler's at their starts.
     pub(super) fn of(sampler: Sampler, i: usize) -> Self {
         // At most 64 evaluations.
         Self::new(i as u8, sampler.evaluations() as u8)
@@ -71,7 +73,8 @@ impl Schedule {
     }
 }
 
-/// Flow times of the reference network's slots for `sampler` and the midpoint rules: each slot's, as the history and the new token have it.
+/// Flow times of the reference network's slots for `sampler` and the midpoint rules: each slot's,
+/// as the history and the new token have it.
 pub fn reference_times(sampler: Sampler, clean_history: Option<CleanHistory>) -> Vec<f32> {
     Schedule::new(sampler).times(clean_history)
 }

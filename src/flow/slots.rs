@@ -1,8 +1,9 @@
 //! One key-value cache per flow time: what a network remembers of the history.
 //!
-//! Rings are numbered `(slot * branches + branch) * layers + layer`; those of the gaze branch come after all others, and are not
-//! touched, hence take no memory, before there is a gaze target: until then the branch is the one without. Position `t` of a ring
-//! holds token `t`. A pass writes the new token's keys and values too; they are provisional, and the next pass over that position,
+//! Rings are numbered `(slot * branches + branch) * layers + layer`; those of the gaze branch come
+//! after all others, and are not touched, hence take no memory, before there is a gaze target:
+//! until then the branch is the one without. Position `t` of a ring holds token `t`. A pass writes
+//! the new token's keys and values too; they are provisional, and the next pass over that position,
 //! when the token is finished, overwrites them.
 
 use super::history::History;
@@ -45,7 +46,8 @@ pub(super) const UNCONDITIONAL: usize = 0;
 pub(super) const NO_GAZE: usize = 1;
 pub(super) const GAZE: usize = 2;
 
-/// A slot: the flow times at which its history and its new token are seen, and how far its cache is filled.
+/// A slot: the flow times at which its history and its new token are seen, and how far its cache is
+/// filled.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Slot {
     tau_history: f32,
@@ -105,7 +107,8 @@ impl Slots {
         self.slots.iter_mut().for_each(|s| (s.committed, s.start) = (next, next));
     }
 
-    /// Whether rows of the same slots of `self` and `other` can go through the layers together: modulation is the same.
+    /// Whether rows of the same slots of `self` and `other` can go through the layers together:
+    /// modulation is the same.
     pub(super) fn alike(&self, other: &Slots) -> bool {
         let same = |(a, b): (&Slot, &Slot)| a.tau_history.to_bits() == b.tau_history.to_bits();
         let paired = self.slots.len() == other.slots.len() && self.slots.iter().zip(&other.slots).all(same);
@@ -130,7 +133,8 @@ impl Slots {
         (end - self.slots[slot].committed.min(end)).min(self.window)
     }
 
-    /// Prediction of the last evaluation, `[branches, latent]`. Where gaze is not guided, the gaze branch equals the one without.
+    /// Prediction of the last evaluation, `[branches, latent]`. Where gaze is not guided, the gaze
+    /// branch equals the one without.
     pub fn x1(&self) -> &[f32] {
         &self.x1
     }
@@ -205,7 +209,8 @@ impl Slots {
         }
     }
 
-    /// Begins the rows of a pass; `guided` tells whether any of them has a gaze target to be guided towards.
+    /// Begins the rows of a pass; `guided` tells whether any of them has a gaze target to be guided
+    /// towards.
     pub(super) fn begin_rows(&mut self, guided: bool) {
         self.rows.clear();
         if guided {
@@ -229,7 +234,8 @@ impl Slots {
         self.rows.attend(exec, layer, &mut self.cache, qkv, out);
     }
 
-    /// A token whose gaze is not guided is the same in both conditional branches: copies its keys and values.
+    /// A token whose gaze is not guided is the same in both conditional branches: copies its keys
+    /// and values.
     pub(super) fn mirror_gaze_branch(&mut self, history: &History, slot: usize, token: u64) {
         if self.gaze && !history.condition(token).guides_gaze() {
             let (from, to) = (self.ring(slot, NO_GAZE), self.ring(slot, GAZE));

@@ -16,7 +16,8 @@ pub struct Stretch {
 }
 
 impl Slots {
-    /// Tokens that slot `slot` lacks. One that lags by more than a window starts anew a window back.
+    /// Tokens that slot `slot` lacks. One that lags by more than a window starts anew a window
+    /// back.
     fn lacks(&mut self, history: &History, slot: usize) -> Range<u64> {
         let end = history.len();
         let oldest = end.saturating_sub(self.window);
@@ -27,7 +28,8 @@ impl Slots {
         s.committed..end
     }
 
-    /// Brings slot `slot` nearer to the finished tokens of `history` by one pass; whether it lacked any.
+    /// Brings slot `slot` nearer to the finished tokens of `history` by one pass; whether it lacked
+    /// any.
     pub(super) fn catch_up(&mut self, tools: &mut Tools<'_>, net: &FlowNet, history: &History, slot: usize) -> bool {
         let lacks = self.lacks(history, slot);
         if lacks.is_empty() {
@@ -38,23 +40,25 @@ impl Slots {
         true
     }
 
-    /// The same by as many passes as it takes until a chunk at most is lacking, which an evaluation commits.
+    /// The same by as many passes as it takes until a chunk at most is lacking, which an evaluation
+    /// commits.
     pub(super) fn approach(&mut self, tools: &mut Tools<'_>, net: &FlowNet, history: &History, slot: usize) {
         while self.lacks(history, slot).start + CHUNK < history.len() {
             self.catch_up(tools, net, history, slot);
         }
     }
 
-    /// The part of an evaluation of slot `slot` for the new token at `z`, over the history that the slot holds and the chunk at most
-    /// that it lacks.
+    /// The part of an evaluation of slot `slot` for the new token at `z`, over the history that the
+    /// slot holds and the chunk at most that it lacks.
     pub(super) fn evaluation<'a>(&'a mut self, history: &'a History, slot: usize, z: &'a [f32]) -> Part<'a> {
         let commit = self.slots[slot].committed..history.len();
         Part { slots: self, history, slot, commit, new: Some(z) }
     }
 
-    /// Computes the keys and values of tokens `from..` (at most `CHUNK` of them, none before `oldest`) of slot `slot` anew,
-    /// in place, seeing nothing before `oldest`; returns the token to go on with, or `None` when the slot is through.
-    /// The rest of the slot stays as it is, so it can be used between two of these passes.
+    /// Computes the keys and values of tokens `from..` (at most `CHUNK` of them, none before
+    /// `oldest`) of slot `slot` anew, in place, seeing nothing before `oldest`; returns the token
+    /// to go on with, or `None` when the slot is through. The rest of the slot stays as it is, so
+    /// it can be used between two of these passes.
     pub(super) fn rewrite(
         &mut self,
         tools: &mut Tools<'_>,

@@ -2,9 +2,11 @@
 
 use crate::error::{Error, ErrorKind, Result};
 
-/// How a block was made: the rule that carries noise to a latent, and its number of network evaluations.
+/// How a block was made: the rule that carries noise to a latent, and its number of network
+/// evaluations.
 ///
-/// Every value is a sampler that exists: [`Sampler::midpoint`], [`Sampler::euler`] and [`str::parse`] refuse all others.
+/// Every value is a sampler that exists: [`Sampler::midpoint`], [`Sampler::euler`] and
+/// [`str::parse`] refuse all others.
 #[non_exhaustive]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Sampler {

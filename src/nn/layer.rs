@@ -27,8 +27,8 @@ impl Layer {
     }
 }
 
-/// One sequence's rows of a pass: for each, the ring of layer 0 that it writes to (layer `l` writes to the `l`-th ring after it),
-/// its position there, and how far back it sees.
+/// One sequence's rows of a pass: for each, the ring of layer 0 that it writes to (layer `l` writes
+/// to the `l`-th ring after it), its position there, and how far back it sees.
 #[derive(Debug, Clone, Default)]
 pub struct Rows {
     base: Vec<u32>,
@@ -49,7 +49,8 @@ impl Rows {
         self.positions.clear();
     }
 
-    /// Adds a row at `position` of the rings from `ring` on, which sees positions `first ..= position`.
+    /// Adds a row at `position` of the rings from `ring` on, which sees positions `first ..=
+    /// position`.
     pub fn push(&mut self, ring: usize, position: u64, first: u64) {
         debug_assert!(first <= position && self.base.len() < self.base.capacity());
         self.base.push(ring as u32);
@@ -67,8 +68,8 @@ impl Rows {
         self.base.is_empty()
     }
 
-    /// Writes the rows' keys and values of layer `layer` to `cache`, then attends over each row's span: `qkv` is `rows x 3d`, `out`
-    /// `rows x d`.
+    /// Writes the rows' keys and values of layer `layer` to `cache`, then attends over each row's
+    /// span: `qkv` is `rows x 3d`, `out` `rows x d`.
     pub fn attend(&mut self, exec: &mut Exec, layer: usize, cache: &mut KvCache, qkv: &[f32], out: &mut [f32]) {
         let d = cache.dim();
         let base = self.base.iter().zip(&self.positions).zip(qkv.chunks_exact(3 * d));

@@ -1,4 +1,5 @@
-//! What the causal transformers share: layers, passes of rows through them over ring caches, and rotary phases.
+//! What the causal transformers share: layers, passes of rows through them over ring caches, and
+//! rotary phases.
 //!
 //! Mirrors `training/visavis_train/nets/layers.py`.
 

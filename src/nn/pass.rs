@@ -1,6 +1,7 @@
 //! A pass: rows that go through a network's layers together, and the memory that this takes.
 //!
-//! A row's results depend on that row and on the cache that it attends to alone, bit for bit, whatever other rows are in the pass.
+//! A row's results depend on that row and on the cache that it attends to alone, bit for bit,
+//! whatever other rows are in the pass.
 
 use super::{Layer, Phases, Rope};
 use crate::kernels::{Epilogue, Exec, Matrix, RowTable};
@@ -8,8 +9,8 @@ use std::ops::Range;
 
 /// Shift, scale and gate of both halves of a layer, one table row for each row of the pass.
 ///
-/// Plain layer norms have their bias as the shift, their weight as the scale and no gates; AdaLN-Zero (Peebles and Xie
-/// 2023) has all six, with `1 + scale` stored as the scale.
+/// Plain layer norms have their bias as the shift, their weight as the scale and no gates;
+/// AdaLN-Zero (Peebles and Xie 2023) has all six, with `1 + scale` stored as the scale.
 #[derive(Clone, Copy)]
 pub struct LayerNorms<'a> {
     /// Shift and scale before the attention.
@@ -22,7 +23,8 @@ pub struct LayerNorms<'a> {
     pub gate2: Option<RowTable<'a>>,
 }
 
-/// The norms of a network; `index` holds the number of the table row that each row of the pass uses.
+/// The norms of a network; `index` holds the number of the table row that each row of the pass
+/// uses.
 pub trait Norms {
     /// Those of layer `layer`.
     fn layer<'a>(&'a self, layer: usize, index: &'a [u32]) -> LayerNorms<'a>;
@@ -31,8 +33,9 @@ pub trait Norms {
     fn last<'a>(&'a self, index: &'a [u32]) -> (RowTable<'a>, RowTable<'a>);
 }
 
-/// The attention of a pass: gets a layer's number and its queries, keys and values, `rows x 3 width`, and fills what each row
-/// attends to, `rows x width`: [`super::Rows::attend`] of each of the caches that the rows belong to.
+/// The attention of a pass: gets a layer's number and its queries, keys and values, `rows x 3
+/// width`, and fills what each row attends to, `rows x width`: [`super::Rows::attend`] of each of
+/// the caches that the rows belong to.
 pub type Attention<'a> = dyn FnMut(&mut Exec, usize, &[f32], &mut [f32]) + 'a;
 
 /// Sizes of a network's layers.
@@ -94,7 +97,8 @@ impl Pass {
         self.rows
     }
 
-    /// Adds a row at `position` of its sequence with norms of table row `norms`, and hands out its input to be filled, `[width]`.
+    /// Adds a row at `position` of its sequence with norms of table row `norms`, and hands out its
+    /// input to be filled, `[width]`.
     ///
     /// # Panics
     /// When there is no room.
@@ -112,7 +116,8 @@ impl Pass {
         &mut self.x[rows.start * self.sizes.width..rows.end * self.sizes.width]
     }
 
-    /// Runs all rows through `layers`; `then` is the layer that will probably run after the last one.
+    /// Runs all rows through `layers`; `then` is the layer that will probably run after the last
+    /// one.
     pub fn run(
         &mut self,
         exec: &mut Exec,
@@ -158,7 +163,8 @@ impl Pass {
         self.read += n;
     }
 
-    /// The rows that were read, multiplied by `matrix`: `out` is `read rows x outputs`, returned as far as it was filled.
+    /// The rows that were read, multiplied by `matrix`: `out` is `read rows x outputs`, returned as
+    /// far as it was filled.
     pub fn project<'o>(&self, exec: &mut Exec, matrix: &Matrix, out: &'o mut [f32]) -> &'o [f32] {
         let out = &mut out[..self.read * matrix.out_features()];
         exec.linear(matrix, &self.normed[..self.read * self.sizes.width], self.read, out, Epilogue::Store);

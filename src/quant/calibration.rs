@@ -17,7 +17,8 @@ const EVERY: usize = 5;
 pub struct Calibration(Activations);
 
 impl Calibration {
-    /// Runs `reference` over `scene`, with its own sampler and with the single step where it has a student.
+    /// Runs `reference` over `scene`, with its own sampler and with the single step where it has a
+    /// student.
     ///
     /// # Errors
     /// None that loading the bundle would not have met.
@@ -34,7 +35,8 @@ impl Calibration {
         Ok(Self(activations.unwrap_or_default()))
     }
 
-    /// The triangular factor that rounding layer `name` of `cols` inputs needs; `None` for a layer that nothing ran through.
+    /// The triangular factor that rounding layer `name` of `cols` inputs needs; `None` for a layer
+    /// that nothing ran through.
     pub(super) fn factor(&self, name: &str, cols: usize) -> Option<Vec<f32>> {
         let moments = self.0.moments(name);
         if moments.len() == cols * cols { factor(moments, cols) } else { None }

@@ -18,8 +18,9 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// `blocks` blocks: voices (24 kHz mono, sample `n` at `n / 24000` s; `None` is absent, and one that ends is silent from there), the
-    /// user's head as a tracker would send it (seconds in ascending order, world metres), and a gaze target or none.
+    /// `blocks` blocks: voices (24 kHz mono, sample `n` at `n / 24000` s; `None` is absent, and one
+    /// that ends is silent from there), the user's head as a tracker would send it (seconds in
+    /// ascending order, world metres), and a gaze target or none.
     ///
     /// # Errors
     /// [`ErrorKind::Argument`](crate::error::ErrorKind::Argument) for 0 blocks.
@@ -37,7 +38,8 @@ impl Scene {
         Ok(Self { agent: agent.map(voice), user: user.map(voice), heads, blocks, gaze })
     }
 
-    /// The same user and length with the two voices exchanged: a conversation that nothing was chosen by.
+    /// The same user and length with the two voices exchanged: a conversation that nothing was
+    /// chosen by.
     #[must_use]
     pub fn exchanged(&self) -> Self {
         Self { agent: self.user.clone(), user: self.agent.clone(), ..self.clone() }
@@ -53,7 +55,8 @@ impl Scene {
         self.gaze
     }
 
-    /// Plays it to a session at its start, through the session's own inputs; `made` is called after each block, with its number.
+    /// Plays it to a session at its start, through the session's own inputs; `made` is called after
+    /// each block, with its number.
     ///
     /// # Errors
     /// Those of pushing and polling, and of `made`.

@@ -1,8 +1,10 @@
-//! Teacher-forced comparison: what another engine makes of each block, given the history that a reference engine made.
+//! Teacher-forced comparison: what another engine makes of each block, given the history that a
+//! reference engine made.
 //!
-//! The reference is a session that runs freely over a scene: what it is told, free gaze included, is what any session with these
-//! options is told. The candidate is a session too, and computes every block from the reference's past: the same latents behind it
-//! (through its own weights), the same root and posture, the same noise, the same user. So the difference is that of one block,
+//! The reference is a session that runs freely over a scene: what it is told, free gaze included,
+//! is what any session with these options is told. The candidate is a session too, and computes
+//! every block from the reference's past: the same latents behind it (through its own weights), the
+//! same root and posture, the same noise, the same user. So the difference is that of one block,
 //! and does not grow. Its voices go through its own audio encoder. Neither re-anchors.
 
 use super::argument;
@@ -46,8 +48,8 @@ pub struct Forced {
     pub frames: Vec<FrameError>,
     /// The reference's latents and the candidate's, standardised, block after block.
     pub latents: [Vec<f32>; 2],
-    /// The reference's decoded features encoded and decoded again, joints against those of the reference's encoder and decoder: metres,
-    /// joint after joint, frame after frame.
+    /// The reference's decoded features encoded and decoded again, joints against those of the
+    /// reference's encoder and decoder: metres, joint after joint, frame after frame.
     pub round_trip: Vec<f32>,
 }
 
@@ -73,7 +75,8 @@ impl Teacher {
     /// Runs `engine` over `scene`; `activations` listens to its layers.
     ///
     /// # Errors
-    /// [`ErrorKind::Argument`](crate::error::ErrorKind::Argument) for a sampler that the bundle has no network for.
+    /// [`ErrorKind::Argument`](crate::error::ErrorKind::Argument) for a sampler that the bundle has
+    /// no network for.
     pub fn new(
         engine: &Arc<Engine>,
         scene: Scene,
@@ -118,8 +121,9 @@ impl Teacher {
     /// What `candidate` makes of every block.
     ///
     /// # Errors
-    /// [`ErrorKind::Argument`](crate::error::ErrorKind::Argument) when it has another rig or other sizes than the reference, or tells its sessions
-    /// something else (calibration of gaze, guidance, temperature).
+    /// [`ErrorKind::Argument`](crate::error::ErrorKind::Argument) when it has another rig or other
+    /// sizes than the reference, or tells its sessions something else (calibration of gaze,
+    /// guidance, temperature).
     pub fn compare(&self, candidate: &Arc<Engine>) -> Result<Forced> {
         let (a, b) = (self.engine.config(), candidate.config());
         if (&a.rig, a.vae, a.flow, &a.audio) != (&b.rig, b.vae, b.flow, &b.audio) {

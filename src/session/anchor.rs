@@ -1,16 +1,18 @@
-//! Re-anchoring: recent motion is encoded anew, so that the latents which the generator builds on are what the encoder
-//! makes of the motion that was shown, however long the session has run.
+//! Re-anchoring: recent motion is encoded anew, so that the latents which the generator builds on
+//! are what the encoder makes of the motion that was shown, however long the session has run.
 //!
-//! Nothing in the networks depends on where in the world the agent is (`ARCHITECTURE.md`), so the world needs no anchor;
-//! what can wander off over minutes is the latent history. Every `period` blocks, or when the agent has gone
-//! `radius` metres, the work is spread over the following blocks, a bounded piece each:
+//! Nothing in the networks depends on where in the world the agent is (`ARCHITECTURE.md`), so the
+//! world needs no anchor; what can wander off over minutes is the latent history. Every `period`
+//! blocks, or when the agent has gone `radius` metres, the work is spread over the following
+//! blocks, a bounded piece each:
 //!
-//! 1. *encode*: the encoder runs through the decoded frames of the last flow window, a few blocks at a time, until it has
-//!    caught up with the present;
-//! 2. *replace*: the new latents take the old ones' place in the history; slot caches are computed anew, a few passes of
-//!    eight tokens a block (what is still to come keeps the old latents' keys, which describe the same motion);
-//! 3. *decode*: a second decoder state runs through the new latents until it has caught up; then both decode the same
-//!    latent once, and the four frames are cross-faded from the one to the other.
+//! 1. *encode*: the encoder runs through the decoded frames of the last flow window, a few blocks at
+//!    a time, until it has caught up with the present;
+//! 2. *replace*: the new latents take the old ones' place in the history; slot caches are computed
+//!    anew, a few passes of eight tokens per block (what is still to come keeps the old latents'
+//!    keys, which describe the same motion);
+//! 3. *decode*: a second decoder state runs through the new latents until it has caught up; then
+//!    both decode the same latent once, and the four frames are cross-faded from the one to the other.
 //!
 //! A block that has no time for its share gives the round up; a new one starts when there is time.
 
@@ -75,8 +77,8 @@ pub(super) struct Moment<'a> {
     /// What `features` come from; another decoder may take over.
     pub(super) decoder: &'a mut DecoderState,
     pub(super) latent: Metric<&'a [f32]>,
-    /// What was decoded, which may be cross-faded; `None` where the latent was not usable: what is shown instead comes with
-    /// [`Anchor::amend`].
+    /// What was decoded, which may be cross-faded; `None` where the latent was not usable: what is
+    /// shown instead comes with [`Anchor::amend`].
     pub(super) features: Option<Standardised<&'a mut [f32]>>,
     pub(super) root: Root,
     /// Whether there is time for a share of the work.
@@ -131,7 +133,8 @@ impl Anchor {
         (self.anchor, self.count) = (start, 0);
     }
 
-    /// Starts a round as soon as there is time, because what the history holds is not what was shown.
+    /// Starts a round as soon as there is time, because what the history holds is not what was
+    /// shown.
     pub(super) fn request(&mut self) {
         (self.phase, self.requested) = (Phase::Rest, true);
     }
@@ -162,7 +165,8 @@ impl Anchor {
         self.encoder.as_ref().map_or(0, EncoderState::cache_bytes) + self.next.cache_bytes()
     }
 
-    /// Remembers the decoded features of a block; without any those are due that [`Anchor::amend`] brings.
+    /// Remembers the decoded features of a block; without any those are due that [`Anchor::amend`]
+    /// brings.
     pub(super) fn remember(&mut self, features: Option<Standardised<&[f32]>>) {
         if let Some(features) = features {
             self.keep(self.blocks, features);
@@ -193,7 +197,8 @@ impl Anchor {
         self.remember(moment.features());
     }
 
-    /// Encodes a few blocks from `from` on; when the present is reached, new latents replace the old ones.
+    /// Encodes a few blocks from `from` on; when the present is reached, new latents replace the
+    /// old ones.
     fn encode(&mut self, tools: &mut Tools<'_>, moment: &mut Moment<'_>, from: u64) {
         let (engine, current) = (tools.engine, self.blocks);
         let to = current.min(from + BLOCKS_PER_STEP);
@@ -277,7 +282,8 @@ impl Anchor {
     }
 }
 
-/// `from` becomes `from` at its start and `to` at its end, in equal steps per frame; features are linear in the joints.
+/// `from` becomes `from` at its start and `to` at its end, in equal steps per frame; features are
+/// linear in the joints.
 fn cross_fade(from: &mut [f32], to: &[f32]) {
     let width = from.len() / BLOCK_FRAMES;
     for (i, (from, to)) in from.chunks_exact_mut(width).zip(to.chunks_exact(width)).enumerate() {

@@ -51,7 +51,8 @@ impl Block<'_> {
         &mut self.state.generator
     }
 
-    /// Holds the last pose instead of computing motion, and rehearses a step where the plan says so.
+    /// Holds the last pose instead of computing motion, and rehearses a step where the plan says
+    /// so.
     pub(super) fn hold(&mut self, tools: &mut Tools<'_>) {
         let Self { plan, state, .. } = self;
         self.outcome = state.inputs.skip(state.block);

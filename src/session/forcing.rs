@@ -1,5 +1,6 @@
-//! What a teacher does to a session: it listens to the layers, and puts another session's block in the place of the one just made,
-//! so that the next one is made from that past. For the quantiser; nothing of it is public.
+//! What a teacher does to a session: it listens to the layers, and puts another session's block in
+//! the place of the one just made, so that the next one is made from that past. For the quantiser;
+//! nothing of it is public.
 
 use super::Session;
 use super::options::SessionOptions;
@@ -59,8 +60,8 @@ impl Session {
         }
     }
 
-    /// Puts `block`, another session's, in the place of the one just made: its latent through this session's own decoder, its motion
-    /// as it stood.
+    /// Puts `block`, another session's, in the place of the one just made: its latent through this
+    /// session's own decoder, its motion as it stood.
     pub(crate) fn follow(&mut self, block: &MadeBlock) {
         let Self { exec, work, engine, state, .. } = self;
         state.generator.replace(state.generator.next_token() - 1, block.z.view());

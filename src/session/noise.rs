@@ -14,7 +14,8 @@ pub(super) enum Noise {
 }
 
 impl Noise {
-    /// Fills the noise of a token. What is seeded is scaled by the temperature; what is given enters as it is.
+    /// Fills the noise of a token. What is seeded is scaled by the temperature; what is given
+    /// enters as it is.
     pub(super) fn fill(&self, engine: &Engine, options: &SessionOptions, token: u64, eps: &mut [f32]) {
         if let Noise::Given(values) = self
             && let Some(given) = values.chunks_exact(eps.len()).nth((token - options.diagnostics.first_block) as usize)

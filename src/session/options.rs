@@ -16,8 +16,8 @@ pub struct SessionOptions {
     pub seed: u64,
     /// Threads that compute a block, 1 or 2. The result is the same.
     pub threads: usize,
-    /// Cores that the second thread may run on (bit i: core i); `None` for any. The first thread is the caller's own:
-    /// [`crate::threads::pin_current_thread`].
+    /// Cores that the second thread may run on (bit i: core i); `None` for any. The first thread is
+    /// the caller's own: [`crate::threads::pin_current_thread`].
     pub core_mask: Option<u64>,
     /// Sampler at the start; with a governor, the best one that it uses.
     pub sampler: Sampler,
@@ -29,14 +29,15 @@ pub struct SessionOptions {
     pub guidance: Option<f32>,
     /// Gaze guidance weight, 0 to 20; `None` for the bundle's.
     pub gaze_guidance: Option<f32>,
-    /// Scale of the noise that blocks start from, 0 to 2; `None` for the bundle's. Less gives calmer motion.
+    /// Scale of the noise that blocks start from, 0 to 2; `None` for the bundle's. Less gives
+    /// calmer motion.
     pub temperature: Option<f32>,
     /// Where the agent stands at the start, in the caller's world.
     pub start: Root,
     /// Whether the root's steps are corrected so that planted feet stay where they are.
     pub stance: bool,
-    /// Whether frames that no body could show are replaced by a held pose ([`crate::stats::GuardStats`]); without it a pose
-    /// that is not finite is an error.
+    /// Whether frames that no body could show are replaced by a held pose
+    /// ([`crate::stats::GuardStats`]); without it a pose that is not finite is an error.
     pub guard: bool,
     /// For measurements and tests.
     #[doc(hidden)]

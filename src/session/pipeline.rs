@@ -1,10 +1,12 @@
-//! The one way from what was pushed to frames, for a session and for a team: a session alone is a team of one.
+//! The one way from what was pushed to frames, for a session and for a team: a session alone is a
+//! team of one.
 //!
 //! ```text
-//! listen -> begin (conditioning, noise) -> sample (flow, passes shared) -> decode (together) -> re-anchor -> pose -> frames
+//! listen -> begin (conditioning, noise) -> sample (passes shared) -> decode -> re-anchor -> pose
 //! ```
 //!
-//! With one block both threads work in each of its layers; with several, what belongs to one of them alone goes to one thread.
+//! With one block both threads work in each of its layers; with several, what belongs to one of
+//! them alone goes to one thread.
 
 use super::block::{Block, Posing};
 use super::inputs::{Listening, listen};
@@ -14,10 +16,11 @@ use crate::flow::{SHARED_ROWS, sample};
 /// Blocks that go through the networks together, at most: two rows each is the least.
 pub(super) const MEMBERS: usize = SHARED_ROWS / 2;
 
-/// Computes `blocks`, each into the frames of its session, or holds its last pose. Several of them are of one engine and can share
-/// passes ([`sample`]). Returns how many went through the networks.
+/// Computes `blocks`, each into the frames of its session, or holds its last pose. Several of them
+/// are of one engine and can share passes ([`sample`]). Returns how many went through the networks.
 ///
-/// Allocates nothing, takes no lock, makes no system call (`tests/sanitize.sh realtime` has the sanitizer watch this function).
+/// Allocates nothing, takes no lock, makes no system call (`tests/sanitize.sh realtime` has the
+/// sanitizer watch this function).
 #[cfg_attr(visavis_rtsan, sanitize(realtime = "nonblocking"))]
 pub(super) fn compute(tools: &mut Tools<'_>, blocks: &mut [Option<Block<'_>>]) -> usize {
     debug_assert!(blocks.len() <= MEMBERS);

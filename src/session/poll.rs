@@ -12,14 +12,16 @@ use crate::frame::{BLOCK_FRAMES, FPS, Frame};
 use std::time::{Duration, Instant};
 
 impl Session {
-    /// Computes the next block if it is due at `now` (session time, seconds) and returns its four frames, or `None`.
-    /// Call it until it returns `None`; a caller that comes late gets all blocks that it missed.
+    /// Computes the next block if it is due at `now` (session time, seconds) and returns its four
+    /// frames, or `None`. Call it until it returns `None`; a caller that comes late gets all blocks
+    /// that it missed.
     ///
-    /// Block `k` is due at `4 k / 30` s. It has heard and seen the user up to then, and the agent's voice through its
-    /// own four frames.
+    /// Block `k` is due at `4 k / 30` s. It has heard and seen the user up to then, and the agent's
+    /// voice through its own four frames.
     ///
     /// # Errors
-    /// [`ErrorKind::Argument`] for a time that is not finite, [`ErrorKind::State`] for one before an earlier call's.
+    /// [`ErrorKind::Argument`] for a time that is not finite, [`ErrorKind::State`] for one before
+    /// an earlier call's.
     pub fn poll(&mut self, now: f64) -> Result<Option<&[Frame]>> {
         self.poll_with(now, None)
     }
@@ -83,7 +85,8 @@ impl Session {
         (self.state.block * BLOCK_FRAMES as u64) as f64 / f64::from(FPS)
     }
 
-    /// Starts anew, as if just made with the current options: same seed, same bits. Time starts at 0 again.
+    /// Starts anew, as if just made with the current options: same seed, same bits. Time starts at
+    /// 0 again.
     ///
     /// # Errors
     /// None that the session's creation would not have met.
@@ -103,8 +106,8 @@ impl Session {
         self.last = None;
     }
 
-    /// Computes `blocks` blocks for nothing and starts anew, so that pages, caches and the CPU's clock are warm when the
-    /// first real block is due. What was pushed before is dropped.
+    /// Computes `blocks` blocks for nothing and starts anew, so that pages, caches and the CPU's
+    /// clock are warm when the first real block is due. What was pushed before is dropped.
     ///
     /// # Errors
     /// As [`Session::poll`] and [`Session::reset`].
@@ -116,8 +119,9 @@ impl Session {
         self.reset()
     }
 
-    /// Replaces the seeded noise of the coming tokens: `noise` holds `[tokens, latent]` values, for the idle clip's
-    /// tokens first. Starts the session anew. For parity checks against other implementations.
+    /// Replaces the seeded noise of the coming tokens: `noise` holds `[tokens, latent]` values, for
+    /// the idle clip's tokens first. Starts the session anew. For parity checks against other
+    /// implementations.
     ///
     /// # Errors
     /// [`ErrorKind::Argument`] when there are fewer tokens than the idle clip has.

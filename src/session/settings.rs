@@ -6,9 +6,10 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::frame::Sampler;
 
 impl Session {
-    /// Sets the gaze target, 0 (averted) to 1 (sustained eye contact), or `None` for free gaze: levels of recorded conversations,
-    /// another one every now and then, where the bundle was calibrated, else what the model finds natural.
-    /// Takes effect with the next block. The first target takes the memory of its guidance branch, a copy of some megabytes.
+    /// Sets the gaze target, 0 (averted) to 1 (sustained eye contact), or `None` for free gaze:
+    /// levels of recorded conversations, another one every now and then, where the bundle was
+    /// calibrated, else what the model finds natural. Takes effect with the next block. The first
+    /// target takes the memory of its guidance branch, a copy of some megabytes.
     ///
     /// # Errors
     /// [`ErrorKind::Argument`] outside -1 to 1.
@@ -21,7 +22,8 @@ impl Session {
         Ok(())
     }
 
-    /// Sets the guidance weights: of the conditioning as a whole (1 is none) and of the gaze target.
+    /// Sets the guidance weights: of the conditioning as a whole (1 is none) and of the gaze
+    /// target.
     ///
     /// # Errors
     /// [`ErrorKind::Argument`] outside 0 to 20.
@@ -32,8 +34,8 @@ impl Session {
         Ok(())
     }
 
-    /// Sets the sampler from the next block on; with a governor, the best one that it uses. Without one, flow times that were
-    /// not visited lately catch up in batched passes within that block.
+    /// Sets the sampler from the next block on; with a governor, the best one that it uses. Without
+    /// one, flow times that were not visited lately catch up in batched passes within that block.
     ///
     /// # Errors
     /// [`ErrorKind::Argument`] when this session has no slots, or the bundle no student, for it.
@@ -53,10 +55,12 @@ impl Session {
         self.options.sampler
     }
 
-    /// Sets who chooses the samplers from the next block on. [`Governor::Off`] pins the session's sampler.
+    /// Sets who chooses the samplers from the next block on. [`Governor::Off`] pins the session's
+    /// sampler.
     ///
     /// # Errors
-    /// [`ErrorKind::Argument`] for a budget out of range, or decisions that are not in ascending order.
+    /// [`ErrorKind::Argument`] for a budget out of range, or decisions that are not in ascending
+    /// order.
     pub fn set_governor(&mut self, governor: Governor) -> Result<()> {
         governor.check()?;
         self.options.governor = governor;
@@ -70,9 +74,10 @@ impl Session {
         self.last = None;
     }
 
-    /// Tells how long the last block took by the caller's own clock, milliseconds, in place of what the session measured; the
-    /// next decision of the governor goes by it. For callers whose deadline covers more than [`Session::poll`], and for
-    /// tests with a clock of their own. Without a block since the last decision it changes nothing.
+    /// Tells how long the last block took by the caller's own clock, milliseconds, in place of what
+    /// the session measured; the next decision of the governor goes by it. For callers whose
+    /// deadline covers more than [`Session::poll`], and for tests with a clock of their own.
+    /// Without a block since the last decision it changes nothing.
     ///
     /// # Errors
     /// [`ErrorKind::Argument`] for a time that is not finite or negative.
@@ -86,8 +91,8 @@ impl Session {
         Ok(())
     }
 
-    /// The decisions of this session, oldest first: each plan that differs from that of the block before. The last 8192 are
-    /// kept. They can be replayed ([`Governor::Replay`]).
+    /// The decisions of this session, oldest first: each plan that differs from that of the block
+    /// before. The last 8192 are kept. They can be replayed ([`Governor::Replay`]).
     pub fn decisions(&self) -> impl Iterator<Item = Decision> + '_ {
         self.log.iter()
     }

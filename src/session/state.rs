@@ -95,7 +95,8 @@ impl BlockState {
         })
     }
 
-    /// Back to the start: `idle`, latents of the idle clip, as history, the agent where the options put it.
+    /// Back to the start: `idle`, latents of the idle clip, as history, the agent where the options
+    /// put it.
     pub(super) fn reset(&mut self, tools: &mut Tools<'_>, options: &SessionOptions, idle: Standardised<&[f32]>) {
         let engine = tools.engine;
         self.block = options.diagnostics.first_block;

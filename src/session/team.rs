@@ -14,11 +14,11 @@ use std::time::Instant;
 
 /// What it takes to step several sessions of one engine together: threads and working memory.
 ///
-/// Reading the weights is most of a block's time. Sessions whose blocks are due at the same time, and made by the same
-/// sampler with history at the same flow times, go through the flow network and the decoder side by side, in the flow
-/// network up to 16 rows a pass: four without a gaze target, two with one, eight on the single-step student. The
-/// others are computed one after the other. What each session shows has the bits that
-/// [`Session::poll`] gives.
+/// Reading the weights is most of a block's time. Sessions whose blocks are due at the same time,
+/// and made by the same sampler with history at the same flow times, go through the flow network
+/// and the decoder side by side, in the flow network up to 16 rows a pass: four without a gaze
+/// target, two with one, eight on the single-step student. The others are computed one after the
+/// other. What each session shows has the bits that [`Session::poll`] gives.
 ///
 /// A team has threads of its own: make the sessions with one thread.
 ///
@@ -66,15 +66,17 @@ impl Team {
         self.shared
     }
 
-    /// Computes the next block of each session that is due at its session time (seconds) and returns how many those were; their
-    /// frames are in [`Session::frames`]. Call it until it returns 0, as [`Session::poll`].
+    /// Computes the next block of each session that is due at its session time (seconds) and
+    /// returns how many those were; their frames are in [`Session::frames`]. Call it until it
+    /// returns 0, as [`Session::poll`].
     ///
-    /// The time that it takes counts for each of them in equal parts ([`Session::stats`], and what a governor goes by).
+    /// The time that it takes counts for each of them in equal parts ([`Session::stats`], and what
+    /// a governor goes by).
     ///
     /// # Errors
-    /// [`ErrorKind::Argument`] for a session of another engine, or a time that is not finite, [`ErrorKind::State`] for a time before an
-    /// earlier one: nothing is computed then. Errors of one session's block, as of [`Session::poll`], come out after the others' blocks are
-    /// done.
+    /// [`ErrorKind::Argument`] for a session of another engine, or a time that is not finite,
+    /// [`ErrorKind::State`] for a time before an earlier one: nothing is computed then. Errors of
+    /// one session's block, as of [`Session::poll`], come out after the others' blocks are done.
     pub fn step(&mut self, sessions: &mut [(&mut Session, f64)]) -> Result<usize> {
         for (session, now) in &*sessions {
             if !Arc::ptr_eq(&session.engine, &self.engine) {
@@ -116,7 +118,8 @@ impl Team {
     }
 }
 
-/// The block of the first session that is due, and those of sessions that can share its passes; `None` when all are done.
+/// The block of the first session that is due, and those of sessions that can share its passes;
+/// `None` when all are done.
 fn gather<'a>(sessions: &'a mut [(&mut Session, f64)]) -> Option<[Option<Block<'a>>; MEMBERS]> {
     let mut blocks: [Option<Block<'a>>; MEMBERS] = [const { None }; MEMBERS];
     let (mut count, mut left) = (0, 0);

@@ -9,7 +9,7 @@ use crate::frame::BLOCK_FRAMES;
 use crate::kernels::{Epilogue, Exec, Kernels, KvDtype, Matrix};
 use crate::normaliser::{Metric, Standardised};
 
-/// Tokens of a block: the latent and four frame slots.
+/// Tokens of a block: the latent and one per frame.
 pub(super) const TOKENS: usize = 1 + BLOCK_FRAMES;
 
 /// Weights of the decoder.
@@ -17,7 +17,8 @@ pub(super) const TOKENS: usize = 1 + BLOCK_FRAMES;
 pub struct Decoder {
     stack: Stack,
     latent: Matrix,
-    /// Embeddings of the five tokens before the latent is added: slot, and frame token where there is one.
+    /// Embeddings of the five tokens before the latent is added: slot, and frame token where there
+    /// is one.
     tokens: Vec<f32>,
     out: Matrix,
 }
@@ -116,7 +117,8 @@ impl DecoderState {
         self.0.reset(first);
     }
 
-    /// Takes back the last block, if there is one, so that the next one takes its place (teacher-forced comparisons).
+    /// Takes back the last block, if there is one, so that the next one takes its place
+    /// (teacher-forced comparisons).
     pub fn back(&mut self) {
         self.0.back();
     }

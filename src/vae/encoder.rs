@@ -1,6 +1,7 @@
 //! The encoder: four frames of pose features in, the mean of their latent out.
 //!
-//! A session needs it to start from the idle clip and to re-anchor; the variance serves training alone and is not read.
+//! A session needs it to start from the idle clip and to re-anchor; the variance serves training
+//! alone and is not read.
 
 use super::stack::{Stack, StackState};
 use super::work::Work;
@@ -19,7 +20,8 @@ pub(super) const TOKENS: usize = BLOCK_FRAMES + 2;
 pub struct Encoder {
     stack: Stack,
     frame: Matrix,
-    /// Embeddings of the six tokens before the frames are added: slot, and `mu` or `sigma` token where there is one.
+    /// Embeddings of the six tokens before the frames are added: slot, and `mu` or `sigma` token
+    /// where there is one.
     tokens: Vec<f32>,
     mu: Matrix,
 }

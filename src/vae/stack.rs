@@ -84,7 +84,8 @@ impl Stack {
         Pass::new(Sizes { width, heads, hidden: width * mlp }, rows, &self.rope)
     }
 
-    /// Adds the tokens of the next block of `state` to `pass` and hands out their embeddings to be filled, `tokens x width`.
+    /// Adds the tokens of the next block of `state` to `pass` and hands out their embeddings to be
+    /// filled, `tokens x width`.
     pub(super) fn push<'p>(&self, state: &mut StackState, pass: &'p mut Pass) -> &'p mut [f32] {
         let n = self.tokens as u64;
         let oldest = (state.block + 1).saturating_sub(self.config.window_blocks as u64).max(state.first);
@@ -98,7 +99,8 @@ impl Stack {
         pass.input(from..from + self.tokens)
     }
 
-    /// Runs the blocks that were pushed, one of each of `members`, and reads tokens `read` of each: normed, member by member.
+    /// Runs the blocks that were pushed, one of each of `members`, and reads tokens `read` of each:
+    /// normed, member by member.
     pub(super) fn run<M>(
         &self,
         exec: &mut Exec,

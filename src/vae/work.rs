@@ -2,7 +2,8 @@
 
 use crate::nn::Pass;
 
-/// What decoding some blocks, or encoding one, needs besides weights and states ([`super::Decoder::work`]).
+/// What decoding some blocks, or encoding one, needs besides weights and states
+/// ([`super::Decoder::work`]).
 #[derive(Debug)]
 pub struct Work {
     pub(super) pass: Pass,

@@ -23,7 +23,8 @@ const LATE: u32 = 3;
 const REHEARSE: [u32; 2] = [8, 64];
 /// Passes for catching up in one block, at most.
 const PASSES: u8 = 4;
-/// A slot of a cheaper rung is brought up to date when it lacks so many tokens, which one pass does.
+/// A slot of a cheaper rung is brought up to date when it lacks so many tokens, which one pass
+/// does.
 const BEHIND: u64 = 7;
 
 /// What the next block would cost, in units of work; rungs as on the ladder, best first.

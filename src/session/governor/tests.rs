@@ -7,7 +7,8 @@ use proptest::prelude::*;
 
 const BUDGET: f64 = 100.0;
 
-/// A device and the slots of a session on it, in a few lines: how many tokens each rung's slots lack.
+/// A device and the slots of a session on it, in a few lines: how many tokens each rung's slots
+/// lack.
 struct Device {
     policy: Policy,
     /// Tokens that the slots of each rung of the ladder lack.
@@ -16,7 +17,8 @@ struct Device {
     plans: Vec<Plan>,
 }
 
-/// Milliseconds of a rung at full speed, and of a pass and of re-anchoring: as measured on one computer, scaled up.
+/// Milliseconds of a rung at full speed, and of a pass and of re-anchoring: as measured on one
+/// computer, scaled up.
 fn time(sampler: Sampler) -> f64 {
     match sampler {
         Sampler::Midpoint4 => 43.0,
@@ -49,7 +51,8 @@ impl Device {
         Self::new(Budget { milliseconds: BUDGET as f32, coarse: false }, Sampler::Midpoint4, true)
     }
 
-    /// One block on a device that is `slow` times slower than at full speed, with `stall` milliseconds of something else.
+    /// One block on a device that is `slow` times slower than at full speed, with `stall`
+    /// milliseconds of something else.
     fn block(&mut self, slow: f64, stall: f64) -> Plan {
         let ladder: Vec<_> = self.policy.ladder().to_vec();
         let mut outlook = Outlook { pass: PASS_WORK, anchor: ANCHOR_WORK, behind: self.behind, ..Outlook::default() };
@@ -116,7 +119,8 @@ fn a_fast_device_climbs_at_once_and_stays() {
     assert!(device.plans[10..].iter().all(|p| p.anchor), "there is time for re-anchoring");
 }
 
-/// A core that runs at half speed from some block on, for ever: nothing is missed, and the rung that fits is kept.
+/// A core that runs at half speed from some block on, for ever: nothing is missed, and the rung
+/// that fits is kept.
 #[test]
 fn a_permanent_half_speed_core_misses_nothing() {
     for start in [0, 1, 40, 333] {
@@ -130,7 +134,8 @@ fn a_permanent_half_speed_core_misses_nothing() {
     }
 }
 
-/// Heat that comes within a minute, stays and goes, slowing the core four times: the single step takes 52 ms then.
+/// Heat that comes within a minute, stays and goes, slowing the core four times: the single step
+/// takes 52 ms then.
 #[test]
 fn heat_that_comes_and_goes_misses_nothing_and_is_climbed_out_of() {
     let mut device = Device::standard();
@@ -149,7 +154,8 @@ fn heat_that_comes_and_goes_misses_nothing_and_is_climbed_out_of() {
     assert!(stats.catch_up_passes >= 8, "slots caught up before the climb");
 }
 
-/// Something else takes 45 ms of a block now and then; the single step fits beside it, and no deadline is missed.
+/// Something else takes 45 ms of a block now and then; the single step fits beside it, and no
+/// deadline is missed.
 #[test]
 fn single_stalls_cost_quality_for_seconds_and_no_deadline() {
     let mut device = Device::standard();
@@ -200,8 +206,9 @@ fn cheaper_rungs_are_kept_ready() {
 }
 
 proptest! {
-    /// Whatever a device does, as long as no block is more than twice as slow as the slowest of the ten before it, no
-    /// deadline is missed where the single step, with headroom for such a change, fits.
+    /// Whatever a device does, as long as no block is more than twice as slow as the slowest of the
+    /// ten before it, no deadline is missed where the single step, with headroom for such a change,
+    /// fits.
     #[test]
     fn nothing_is_missed_where_the_single_step_fits(
         steps in prop::collection::vec((0.3f64..1.4, 1usize..60), 1..40),
