@@ -21,6 +21,7 @@ pub mod offline;
 pub mod par;
 pub mod pose;
 pub mod quant;
+mod queue;
 pub mod recording;
 pub mod report;
 pub mod session;

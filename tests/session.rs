@@ -4,6 +4,7 @@ mod common;
 
 use common::{Inputs, motion, poll_blocks, run, tiny};
 use glam::Vec3;
+use visavis::audio::Speaker;
 use visavis::error::ErrorKind;
 use visavis::frame::{BLOCK_FRAMES, FPS, Frame, Sampler};
 use visavis::session::{Session, SessionOptions};
@@ -69,8 +70,8 @@ fn chunking_and_interleaving_do_not_change_a_bit() {
     // A voice is absent until its first push; both make their appearance before the first block here.
     let present = || {
         let mut session = engine.session(options()).unwrap();
-        session.agent_voice().set_present(true);
-        session.user_voice().set_present(true);
+        session.voice_input(Speaker::Agent).set_present(true);
+        session.voice_input(Speaker::User).set_present(true);
         session
     };
     let whole = run(&mut present(), &inputs, BLOCKS);

@@ -4,11 +4,13 @@
 //! file: Wav ──┐
 //!             ├─> Voice (Resampler, ring on the session's time line) ──> AudioEncoder ──> D_a features a frame
 //! push: f32 ──┘   any rate and size in, 3200 samples a block out         on our kernels, or TractEncoder
+//!    VoiceInput, from any thread
 //! ```
 
 mod encoder;
+mod input;
+mod line;
 mod resample;
-mod ring;
 #[cfg(feature = "tract")]
 mod tract;
 mod voice;
@@ -16,6 +18,7 @@ mod wav;
 mod weights;
 
 pub use encoder::AudioEncoder;
+pub use input::{Speaker, VoiceInput};
 pub use resample::{MAX_RATE, MIN_RATE, Resampler, resample_to_24k};
 #[cfg(feature = "tract")]
 pub use tract::TractEncoder;

@@ -7,6 +7,8 @@
 //! | file | what |
 //! |---|---|
 //! | `options` | what a session is made with |
+//! | `controls` | settings from other threads |
+//! | `shared` | a session, its inputs and its controls, for several threads |
 //! | `inputs` | voices and head positions to the conditioning of a block |
 //! | `gaze` | the wanted gaze to the gaze channel, free gaze included |
 //! | `block` | the computation of a block |
@@ -16,31 +18,39 @@
 //! | `stats` | block times and counters |
 //! | `probe` | every stage of a block, for whoever wants to check the maths |
 //!
+//! Inputs and settings may come from any thread while a block is computed ([`VoiceInput`], [`HeadInput`], [`Controls`]): nobody
+//! waits for the block, and a block goes by what was there when its poll began.
+//!
 //! After [`Session::poll`] has been called once, computing a block allocates nothing, takes no lock and makes no system
 //! call. The exceptions are outside the block: the first push of a voice, or a change of its rate, makes a resampler.
 
 mod anchor;
 mod block;
+mod controls;
 mod gaze;
 mod governor;
 mod inputs;
 mod options;
 mod probe;
+mod shared;
 mod stats;
 mod team;
 
+pub use controls::Controls;
 pub use gaze::GazeControl;
 pub use governor::{Budget, Decision, Governor, GovernorStats, Hold, Plan};
 pub use options::{Anchoring, HistoryTime, SessionOptions};
 pub use probe::Probe;
+pub use shared::SharedSession;
 pub use stats::{Delays, InputStats, SessionStats};
 pub use team::Team;
 
-use crate::audio::Voice;
+use crate::audio::{Speaker, VoiceInput};
 use crate::engine::Engine;
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{BLOCK_FRAMES, FPS, Frame, Sampler};
 use crate::kernels::Exec;
+use crate::user::HeadInput;
 use block::BlockState;
 use glam::Vec3;
 use governor::{Log, Policy};
@@ -56,6 +66,7 @@ pub struct Session {
     options: SessionOptions,
     exec: Exec,
     state: BlockState,
+    controls: Controls,
     now: f64,
     times: stats::BlockTimes,
     policy: Option<Policy>,
@@ -73,10 +84,11 @@ impl Session {
         let mut exec = engine.exec(options.threads)?;
         options.core_mask.map_or(Ok(()), |mask| exec.pool().pin_helper(mask))?;
         let state = BlockState::new(&mut exec, &engine, &options)?;
+        let controls = Controls::new(&engine, |sampler| state.supports(sampler));
         let times = stats::BlockTimes::new();
         let (log, policy, last) = (Log::new(), None, None);
         let mut session =
-            Self { engine, options, exec, state, now: 0.0, times, policy, log, last, due: None, done: None };
+            Self { engine, options, exec, state, controls, now: 0.0, times, policy, log, last, due: None, done: None };
         session.policy = session.fresh_policy();
         Ok(session)
     }
@@ -86,46 +98,62 @@ impl Session {
         Some(Policy::new(budget, self.options.sampler, self.engine.student.is_some()))
     }
 
-    /// Appends to the agent's own voice: mono samples, full scale 1, any rate from 8 to 192 kHz.
+    /// Appends to a voice: mono samples, full scale 1, any rate from 8 to 192 kHz. The same as [`VoiceInput::push`] of
+    /// [`Session::voice_input`].
     ///
     /// The voice may come ahead of time (text-to-speech does) by up to a minute. Sound that has not come when a block is
     /// computed is silence there, is counted, and is heard later. A voice that has never been pushed is absent,
     /// which is not the same as silent.
     ///
     /// # Errors
-    /// [`ErrorKind::Audio`] for a bad rate or samples that are not finite; nothing of the push is taken.
-    pub fn push_agent_audio(&mut self, samples: &[f32], rate: u32) -> Result<()> {
-        self.state.inputs.agent_voice().push(samples, rate)
+    /// As [`VoiceInput::push`]: [`ErrorKind::Audio`] for a bad rate or samples that are not finite.
+    pub fn push_audio(&mut self, speaker: Speaker, samples: &[f32], rate: u32) -> Result<()> {
+        self.state.inputs.voice(speaker).push(samples, rate)
     }
 
-    /// Appends to the user's voice; as [`Session::push_agent_audio`].
+    /// [`Session::push_audio`] of the agent's own voice.
     ///
     /// # Errors
-    /// As [`Session::push_agent_audio`].
-    pub fn push_user_audio(&mut self, samples: &[f32], rate: u32) -> Result<()> {
-        self.state.inputs.user_voice().push(samples, rate)
+    /// As [`Session::push_audio`].
+    pub fn push_agent_audio(&mut self, samples: &[f32], rate: u32) -> Result<()> {
+        self.push_audio(Speaker::Agent, samples, rate)
     }
 
-    /// The agent's voice, to end an utterance, to break one off, or to set its presence.
-    pub fn agent_voice(&mut self) -> &mut Voice {
-        self.state.inputs.agent_voice()
-    }
-
-    /// The user's voice, likewise.
-    pub fn user_voice(&mut self) -> &mut Voice {
-        self.state.inputs.user_voice()
-    }
-
-    /// Tells where the user's head is (midpoint of the eyes), world metres, at `time` seconds of session time.
+    /// [`Session::push_audio`] of the user's voice.
     ///
-    /// Any rate; positions that are not finite, out of order, or impossible are ignored and counted (see
+    /// # Errors
+    /// As [`Session::push_audio`].
+    pub fn push_user_audio(&mut self, samples: &[f32], rate: u32) -> Result<()> {
+        self.push_audio(Speaker::User, samples, rate)
+    }
+
+    /// Tells where the user's head is (midpoint of the eyes), world metres, at `time` seconds of session time. The same as
+    /// [`HeadInput::push`] of [`Session::head_input`].
+    ///
+    /// Any rate; positions that are not finite, late, or impossible are ignored and counted (see
     /// [`Session::stats`]).
     ///
     /// # Errors
     /// None today; the result leaves room for typed refusals.
     pub fn push_user_head(&mut self, position: Vec3, time: f64) -> Result<()> {
-        self.state.inputs.push_head(position, time);
+        self.state.inputs.head().push(position, time);
+        self.state.inputs.look();
         Ok(())
+    }
+
+    /// A voice's input, for the thread that has its sound: to push, to end an utterance, to break one off, to set the voice's presence.
+    pub fn voice_input(&self, speaker: Speaker) -> VoiceInput {
+        self.state.inputs.voice(speaker).clone()
+    }
+
+    /// The input of the user's head, for the thread that tracks it.
+    pub fn head_input(&self) -> HeadInput {
+        self.state.inputs.head().clone()
+    }
+
+    /// The settings, for other threads: what is set there holds from the next poll on.
+    pub fn controls(&self) -> Controls {
+        self.controls.clone()
     }
 
     /// Sets the gaze target, 0 (averted) to 1 (sustained eye contact), or `None` for free gaze: levels of recorded conversations,
@@ -136,11 +164,16 @@ impl Session {
     /// [`ErrorKind::Argument`] outside -1 to 1.
     pub fn set_gaze(&mut self, target: Option<f32>) -> Result<()> {
         options::check_gaze(target)?;
+        self.controls.settle_gaze();
+        self.apply_gaze(target);
+        Ok(())
+    }
+
+    fn apply_gaze(&mut self, target: Option<f32>) {
         if self.options.gaze_control.guides(target) {
             self.state.generator.open_gaze();
         }
         self.options.gaze = target;
-        Ok(())
     }
 
     /// Sets the guidance weights: of the conditioning as a whole (1 is none) and of the gaze target.
@@ -150,6 +183,7 @@ impl Session {
     pub fn set_guidance(&mut self, weight: f32, gaze: f32) -> Result<()> {
         options::check_guidance(weight)?;
         options::check_guidance(gaze)?;
+        self.controls.settle_guidance();
         (self.options.guidance, self.options.gaze_guidance) = (Some(weight), Some(gaze));
         Ok(())
     }
@@ -163,16 +197,21 @@ impl Session {
         if !self.state.supports(sampler) {
             return Err(options::unsupported(sampler, &self.engine));
         }
+        self.controls.settle_sampler();
+        self.apply_sampler(sampler);
+        Ok(())
+    }
+
+    fn apply_sampler(&mut self, sampler: Sampler) {
         if sampler != self.options.sampler {
             self.options.sampler = sampler;
             self.renew_policy();
         }
-        Ok(())
     }
 
-    /// The sampler that was set; what made a frame is in [`Frame::sampler`].
+    /// The sampler that was set, here or by [`Session::controls`]; what made a frame is in [`Frame::sampler`].
     pub fn sampler(&self) -> Sampler {
-        self.options.sampler
+        self.controls.sampler().unwrap_or(self.options.sampler)
     }
 
     /// Sets who chooses the samplers from the next block on. [`Governor::Off`] pins the session's sampler.
@@ -181,9 +220,14 @@ impl Session {
     /// [`ErrorKind::Argument`] for a budget out of range, or decisions that are not in ascending order.
     pub fn set_governor(&mut self, governor: Governor) -> Result<()> {
         governor.check()?;
+        self.controls.settle_budget();
+        self.apply_governor(governor);
+        Ok(())
+    }
+
+    fn apply_governor(&mut self, governor: Governor) {
         self.options.governor = governor;
         self.renew_policy();
-        Ok(())
     }
 
     fn renew_policy(&mut self) {
@@ -199,13 +243,16 @@ impl Session {
     /// # Errors
     /// [`ErrorKind::Argument`] for a time that is not finite or negative.
     pub fn report_block_time(&mut self, milliseconds: f64) -> Result<()> {
-        if !(milliseconds.is_finite() && milliseconds >= 0.0) {
-            return Err(Error::new(ErrorKind::Argument, format!("a block time of {milliseconds} ms: 0 or more")));
-        }
+        options::check_block_time(milliseconds)?;
+        self.controls.settle_block_time();
+        self.apply_block_time(milliseconds);
+        Ok(())
+    }
+
+    fn apply_block_time(&mut self, milliseconds: f64) {
         if let Some((_, _, measured)) = &mut self.last {
             *measured = milliseconds;
         }
-        Ok(())
     }
 
     /// The decisions of this session, oldest first: each plan that differs from that of the block before. The last 8192 are
@@ -271,10 +318,11 @@ impl Session {
         Ok(Some(&self.state.frames))
     }
 
-    /// Sets the time; whether a block is due.
+    /// Sets the time, takes notice of what came from other threads; whether a block is due.
     fn is_due(&mut self, now: f64) -> Result<bool> {
         self.check_time(now)?;
         self.now = now;
+        self.take_notice();
         Ok(now >= self.next_due() - 1e-9)
     }
 
@@ -318,6 +366,7 @@ impl Session {
     /// # Errors
     /// None that the session's creation would not have met.
     pub fn reset(&mut self) -> Result<()> {
+        self.take_notice();
         self.now = 0.0;
         self.times.clear();
         self.log.clear();

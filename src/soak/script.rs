@@ -1,5 +1,6 @@
 //! What happens when in a cycle.
 
+use crate::audio::Speaker;
 use crate::engine::Engine;
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{BLOCK_FRAMES, FPS, Root, SAMPLE_RATE, Sampler};
@@ -100,7 +101,7 @@ impl<'a> Script<'a> {
             session.set_gaze(GAZES[part as usize % GAZES.len()])?;
             let cheap = self.student && (14..16).contains(&part);
             session.set_sampler(if cheap { Sampler::Single } else { self.sampler })?;
-            session.user_voice().set_present(part != 9);
+            session.voice_input(Speaker::User).set_present(part != 9);
         }
         let quiet = part == 6 || part == 17;
         let seconds = BLOCK_FRAMES as f64 / f64::from(FPS);

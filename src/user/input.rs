@@ -1,0 +1,78 @@
+//! The end of the head's track that is pushed into, from any thread.
+
+use super::HeadTrack;
+use super::track::CAPACITY;
+use crate::queue::Queue;
+use glam::Vec3;
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+use std::sync::atomic::Ordering::Relaxed;
+
+/// Words of a sample: time, x and y, z.
+const WORDS: usize = 3;
+/// Attempts to make room before a sample is given up: more than that many other threads are at it.
+const ATTEMPTS: usize = 8;
+
+/// The input of the user's head: tells where it is from any thread, also while the session computes a block.
+///
+/// Nothing here waits or allocates. A block knows what was pushed before its poll began. Samples are put in order by their time stamps,
+/// whichever thread they come from: the same samples give the same bits. Up to 8192 (68 s at 120 Hz) wait for the next poll; beyond
+/// that the oldest are dropped and counted ([`super::TrackStats::overwritten`]).
+#[derive(Clone)]
+pub struct HeadInput {
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    samples: Queue<WORDS>,
+    dropped: AtomicU64,
+}
+
+impl HeadInput {
+    pub(crate) fn new() -> Self {
+        Self { shared: Arc::new(Shared { samples: Queue::new(CAPACITY), dropped: AtomicU64::new(0) }) }
+    }
+
+    /// Tells where the head is (midpoint of the eyes), world metres, at `time` seconds of session time.
+    ///
+    /// Any rate and any order: a sample is in time as long as no block has used one that is not earlier, and so as long as no poll came in
+    /// between. Samples that are late, not finite, or impossible are ignored and counted ([`super::TrackStats`]).
+    pub fn push(&self, position: Vec3, time: f64) {
+        let [x, y, z] = position.to_array().map(|v| u64::from(v.to_bits()));
+        let sample = [time.to_bits(), x | y << 32, z];
+        let Shared { samples, dropped } = &*self.shared;
+        for _ in 0..ATTEMPTS {
+            if samples.push(&sample) {
+                return;
+            }
+            // The newest matter most.
+            dropped.fetch_add(u64::from(samples.pop(&mut [0; WORDS])), Relaxed);
+        }
+        dropped.fetch_add(1, Relaxed);
+    }
+
+    /// Moves what was pushed into `track`; returns at the latest after as many samples as wait at once.
+    pub(crate) fn drain(&self, track: &mut HeadTrack) {
+        let mut sample = [0; WORDS];
+        for _ in 0..CAPACITY {
+            if !self.shared.samples.pop(&mut sample) {
+                break;
+            }
+            let [time, xy, z] = sample;
+            let position = [xy as u32, (xy >> 32) as u32, z as u32].map(f32::from_bits);
+            track.push(Vec3::from_array(position), f64::from_bits(time));
+        }
+        track.count_dropped(self.shared.dropped.swap(0, Relaxed));
+    }
+
+    /// Drops what was pushed.
+    pub(crate) fn reset(&self) {
+        self.drain(&mut HeadTrack::with_capacity(2));
+    }
+}
+
+impl std::fmt::Debug for HeadInput {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("HeadInput").field("room", &self.shared.samples.room()).finish_non_exhaustive()
+    }
+}
