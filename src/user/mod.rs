@@ -1,10 +1,8 @@
 //! The person in front of the agent: a head position at any rate, asked for at frame times.
 
-mod csv;
 mod input;
 mod track;
 
-pub use csv::UserPath;
 pub use input::HeadInput;
 pub use track::{HeadTrack, Presence, TrackStats, UserSample};
 
