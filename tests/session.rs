@@ -66,7 +66,7 @@ fn chunking_and_interleaving_do_not_change_a_bit() {
     let (engine, inputs) = (tiny(), inputs());
     // A voice is absent until its first push; both make their appearance before the first block here.
     let present = || {
-        let mut session = engine.session(options()).unwrap();
+        let session = engine.session(options()).unwrap();
         session.voice_input(Speaker::Agent).set_present(true);
         session.voice_input(Speaker::User).set_present(true);
         session
@@ -219,7 +219,6 @@ fn bad_arguments_are_typed_errors_and_change_nothing() {
     assert_eq!(session.set_gaze(Some(2.0)).unwrap_err().kind(), ErrorKind::Argument);
     assert_eq!(session.set_guidance(1.0, f32::INFINITY).unwrap_err().kind(), ErrorKind::Argument);
     assert_eq!(session.set_sampler(Sampler::Euler(5)).unwrap_err().kind(), ErrorKind::Argument);
-    assert_eq!(session.push_agent_audio(&[0.0, f32::NAN], 24_000).unwrap_err().kind(), ErrorKind::Audio);
     assert_eq!(session.push_agent_audio(&[0.0], 0).unwrap_err().kind(), ErrorKind::Audio);
     assert_eq!(session.options(), &options());
     session.push_user_head(Vec3::NAN, 0.0).unwrap();

@@ -22,13 +22,13 @@ pub enum VisavisStatus {
     BundleVersion = 4,
     /// The bundle's config and tensors disagree.
     BundleInvalid = 5,
-    /// Audio of a bad rate, or samples that are not finite; nothing of the push was taken.
+    /// Audio of a bad rate, of which nothing was taken, or samples that are not finite, in whose place there is silence.
     Audio = 6,
     /// The call does not fit the session's state, for example time that runs backwards.
     State = 7,
     /// VISAVIS_CPU asks for a level that this CPU does not have.
     CpuLevel = 8,
-    /// Another thread is inside this session.
+    /// Another thread is inside this session. Pushes and settings never meet this.
     Busy = 9,
     /// Program and library do not fit together.
     Abi = 10,
