@@ -8,8 +8,8 @@
  *  - visavis_engine and visavis_session are opaque. Who makes one frees it, once, with visavis_engine_free or
  *    visavis_session_free; freeing NULL does nothing. A session keeps what it needs of its engine: the order of
  *    freeing is free. A pointer that was freed must not be used again.
- *  - Arrays that are passed in stay the caller's and are not kept: they may be changed or freed when the call has returned, not before. A file
- *    descriptor stays the caller's and may be closed when the call has returned.
+ *  - Arrays that are passed in stay the caller's and are not kept: they may be changed or freed when the call has returned, not
+ *    before. A file descriptor stays the caller's and may be closed when the call has returned.
  *  - Arrays and structs that are filled belong to the caller, who gives their size; nothing is written beyond it.
  *  - Strings that are returned belong to the library and must not be freed: names live as long as their engine,
  *    visavis_last_error's text until the next call of this library by the same thread, visavis_version's for ever.
@@ -49,7 +49,7 @@
 #include <stdlib.h>
 
 // Version of this interface, 1.1: major number in the upper 16 bits, minor in the lower.
-#define VISAVIS_ABI_VERSION 65537
+#define VISAVIS_ABI_VERSION ((1 << 16) | 1)
 
 // Frames that a poll gives when a block is due.
 #define VISAVIS_BLOCK_FRAMES 4
@@ -197,7 +197,6 @@ typedef struct visavis_session_options {
     float budget_ms;
     // 0.
     uint32_t reserved;
-    ;
 } visavis_session_options;
 
 // One frame of motion, without its joints. World coordinates: metres, right-handed, Y up.
@@ -224,7 +223,6 @@ typedef struct visavis_frame {
     uint32_t sampler_steps;
     // How much of the frame is a held pose instead of the model's, 0 to 1.
     float held;
-    ;
 } visavis_frame;
 
 // One joint of a frame. Quaternions are x, y, z, w.
@@ -313,7 +311,6 @@ typedef struct visavis_stats {
     uint64_t user_bad_rate_samples;
     // See agent_contended_samples.
     uint64_t user_contended_samples;
-    ;
 } visavis_stats;
 
 #ifdef __cplusplus

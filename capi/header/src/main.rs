@@ -22,14 +22,16 @@ fn header(grown: bool) -> String {
     let mut text = Vec::new();
     builder.generate().expect("a header").write(&mut text);
     let text = String::from_utf8(text).expect("UTF-8");
-    let mut inside = false;
-    let mut kept = String::new();
-    for line in text.split_inclusive('\n') {
-        match line.trim_end() {
-            GROWN => inside = true,
-            "#endif" if inside => inside = false,
-            _ if inside && !grown => {}
-            _ => kept += line,
+    let (mut kept, mut lines) = (String::new(), text.split_inclusive('\n'));
+    while let Some(line) = lines.next() {
+        if line.trim_end() != GROWN {
+            kept += line;
+            continue;
+        }
+        let field: String = lines.by_ref().take_while(|line| line.trim_end() != "#endif").collect();
+        assert_eq!(lines.next().map(str::trim), Some(";"), "after a field");
+        if grown {
+            kept += &format!("{};\n", field.trim_end());
         }
     }
     kept
