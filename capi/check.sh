@@ -37,7 +37,6 @@ echo '-- smoke program, shared library'
 cc "${warnings[@]}" -I capi/include capi/examples/smoke.c -o "$out/smoke" -L "$target/release" -lvisavis_c "${libraries[@]}"
 LD_LIBRARY_PATH=$target/release "$out/smoke" tests/goldens/tiny.safetensors
 echo '-- programs and libraries of two versions'
-LD_LIBRARY_PATH=$out/next "$out/smoke" tests/goldens/tiny.safetensors
 versions() { # versions NAME HEADER FLAGS...
   local name=$1 header=$2
   shift 2

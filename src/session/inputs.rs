@@ -254,7 +254,7 @@ impl Inputs {
         InputStats {
             agent_voice: self.agent.voice.stats(),
             user_voice: self.user.voice.stats(),
-            head: self.track.stats(),
+            head: self.head.stats(&self.track),
         }
     }
 

@@ -1,7 +1,7 @@
 //! The end of the head's track that is pushed into, from any thread.
 
-use super::HeadTrack;
-use super::track::CAPACITY;
+use super::track::{CAPACITY, Fault, fault};
+use super::{HeadTrack, TrackStats};
 use crate::queue::Queue;
 use glam::Vec3;
 use std::sync::Arc;
@@ -25,12 +25,15 @@ pub struct HeadInput {
 
 struct Shared {
     samples: Queue<WORDS>,
+    non_finite: AtomicU64,
+    absurd: AtomicU64,
     dropped: AtomicU64,
 }
 
 impl HeadInput {
     pub(crate) fn new() -> Self {
-        Self { shared: Arc::new(Shared { samples: Queue::new(CAPACITY), dropped: AtomicU64::new(0) }) }
+        let [non_finite, absurd, dropped] = [const { AtomicU64::new(0) }; 3];
+        Self { shared: Arc::new(Shared { samples: Queue::new(CAPACITY), non_finite, absurd, dropped }) }
     }
 
     /// Tells where the head is (midpoint of the eyes), world metres, at `time` seconds of session time.
@@ -38,17 +41,25 @@ impl HeadInput {
     /// Any rate and any order: a sample is in time as long as no block has used one that is not earlier, and so as long as no poll came in
     /// between. Samples that are late, not finite, or impossible are ignored and counted ([`super::TrackStats`]).
     pub fn push(&self, position: Vec3, time: f64) {
+        let Shared { samples, non_finite, absurd, dropped } = &*self.shared;
+        let count = |counter: &AtomicU64| _ = counter.fetch_add(1, Relaxed);
+        match fault(position, time) {
+            Some(Fault::NonFinite) => return count(non_finite),
+            Some(Fault::Absurd) => return count(absurd),
+            None => {}
+        }
         let [x, y, z] = position.to_array().map(|v| u64::from(v.to_bits()));
         let sample = [time.to_bits(), x | y << 32, z];
-        let Shared { samples, dropped } = &*self.shared;
         for _ in 0..ATTEMPTS {
             if samples.push(&sample) {
                 return;
             }
             // The newest matter most.
-            dropped.fetch_add(u64::from(samples.pop(&mut [0; WORDS])), Relaxed);
+            if samples.pop(&mut [0; WORDS]) {
+                count(dropped);
+            }
         }
-        dropped.fetch_add(1, Relaxed);
+        count(dropped);
     }
 
     /// Moves what was pushed into `track`; returns at the latest after as many samples as wait at once.
@@ -62,12 +73,22 @@ impl HeadInput {
             let position = [xy as u32, (xy >> 32) as u32, z as u32].map(f32::from_bits);
             track.push(Vec3::from_array(position), f64::from_bits(time));
         }
-        track.count_dropped(self.shared.dropped.swap(0, Relaxed));
     }
 
-    /// Drops what was pushed.
+    /// Counters of a track, and of what did not get there. What waits for the next poll is in none of them.
+    pub(crate) fn stats(&self, track: &HeadTrack) -> TrackStats {
+        let (mut stats, Shared { non_finite, absurd, dropped, .. }) = (track.stats(), &*self.shared);
+        stats.non_finite += non_finite.load(Relaxed);
+        stats.absurd += absurd.load(Relaxed);
+        stats.overwritten += dropped.load(Relaxed);
+        stats
+    }
+
+    /// Drops what was pushed, and counts from zero.
     pub(crate) fn reset(&self) {
         self.drain(&mut HeadTrack::with_capacity(2));
+        let Shared { non_finite, absurd, dropped, .. } = &*self.shared;
+        [non_finite, absurd, dropped].into_iter().for_each(|counter| counter.store(0, Relaxed));
     }
 }
 

@@ -58,6 +58,21 @@ struct Sample {
     jump: bool,
 }
 
+/// Why a sample is of no use, whatever came before it.
+pub(super) enum Fault {
+    NonFinite,
+    Absurd,
+}
+
+pub(super) fn fault(position: Vec3, time: f64) -> Option<Fault> {
+    if !position.is_finite() || !time.is_finite() {
+        return Some(Fault::NonFinite);
+    }
+    // Squares of absurd positions overflow to infinity, which is refused as well.
+    let absurd = position.length_squared() > MAX_DISTANCE * MAX_DISTANCE || time.abs() > MAX_TIME;
+    absurd.then_some(Fault::Absurd)
+}
+
 /// Timed head positions. Bounded; allocates when made and never after.
 ///
 /// Causal: the answer for a frame depends on samples with `time <= now` only, so pushing a whole recording ahead of time
@@ -96,14 +111,10 @@ impl HeadTrack {
     /// Adds a head position (world, metres, within 1 km) at `time` (session time, seconds), which is later than all samples that
     /// were used and is no other sample's. What does not fit that is ignored and counted, see [`TrackStats`].
     pub fn push(&mut self, position: Vec3, time: f64) {
-        if !position.is_finite() || !time.is_finite() {
-            self.stats.non_finite += 1;
-            return;
-        }
-        // Squares of absurd positions overflow to infinity, which is refused as well.
-        if position.length_squared() > MAX_DISTANCE * MAX_DISTANCE || time.abs() > MAX_TIME {
-            self.stats.absurd += 1;
-            return;
+        match fault(position, time) {
+            Some(Fault::NonFinite) => return self.stats.non_finite += 1,
+            Some(Fault::Absurd) => return self.stats.absurd += 1,
+            None => {}
         }
         let mut at = self.samples.len();
         if self.samples.back().is_some_and(|last| time <= last.time) {
@@ -187,11 +198,6 @@ impl HeadTrack {
         for (i, sample) in out.iter_mut().enumerate() {
             *sample = self.sample((first_frame + i as u64) as f64 / f64::from(FPS), now);
         }
-    }
-
-    /// Counts samples that were dropped before they got here.
-    pub(super) fn count_dropped(&mut self, samples: u64) {
-        self.stats.overwritten += samples;
     }
 
     /// Counters since the start.

@@ -137,7 +137,15 @@ fn an_input_may_be_pushed_into_from_several_threads() {
     (0..9_000).for_each(|i| input.push(at(1.0), 20.0 + f64::from(i) * 0.01));
     let mut t = HeadTrack::new();
     input.drain(&mut t);
-    assert_eq!(t.stats(), TrackStats { accepted: 8_192, overwritten: 808, ..Default::default() });
+    assert_eq!(t.stats().accepted, 8_192);
+    input.push(at(f32::NAN), 1.0);
+    input.push(at(0.0), 1e9);
+    let want = TrackStats { accepted: 8_192, overwritten: 808, non_finite: 1, absurd: 1, ..Default::default() };
+    assert_eq!(input.stats(&t), want);
+    input.push(at(0.0), 1.0);
+    input.reset();
+    input.drain(&mut t);
+    assert_eq!(input.stats(&t), TrackStats { accepted: 8_192, ..Default::default() });
     assert_eq!((t.sample(28.07, 200.0), t.sample(109.99, 200.0)), (ABSENT, measured(1.0)));
 }
 

@@ -1,6 +1,6 @@
 //! Engines.
 
-use crate::buffers::elements;
+use crate::buffers::{bytes, elements};
 use crate::error::{Failure, Outcome, Throw};
 use crate::handles::Table;
 use crate::native;
@@ -55,9 +55,9 @@ fn engine_from_buffer<'l>(
     position: jint,
     length: jint,
 ) -> Outcome<jlong> {
-    // SAFETY: read only; should Java change it meanwhile, loading sees other numbers, which it checks.
-    let bytes = unsafe { elements::<u8>(env, buffer.as_ref(), position, length) }?;
-    Ok(ENGINES.insert(Engine::from_slice(bytes, "bundle in memory")?))
+    // SAFETY: a ByteBuffer.
+    let there = unsafe { elements(env, buffer.as_ref(), position, length) }?;
+    Ok(ENGINES.insert(Engine::from_bytes(bytes(there), "bundle in memory")?))
 }
 
 fn engine_from_bytes<'l>(env: &mut Env<'l>, _: JClass<'l>, bytes: JByteArray<'l>) -> Outcome<jlong> {
