@@ -23,6 +23,9 @@
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! Voices, head positions and settings may come from other threads, by [`Session::voice_input`], [`Session::head_input`] and
+//! [`Session::controls`]. Whoever pushes never waits for a block, and the same inputs give the same motion, whichever threads they come from.
 #![cfg_attr(visavis_rtsan, feature(sanitize))]
 #![cfg_attr(
     not(feature = "internals"),

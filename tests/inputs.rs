@@ -56,7 +56,9 @@ fn when_it_is_pushed_does_not_change_a_bit() {
     let done = [const { AtomicUsize::new(0) }; 3];
     let mut frames = Vec::new();
     std::thread::scope(|scope| {
-        for (speaker, sound, done) in [(Speaker::Agent, &inputs.agent, &done[0]), (Speaker::User, &inputs.user, &done[1])] {
+        for (speaker, sound, done) in
+            [(Speaker::Agent, &inputs.agent, &done[0]), (Speaker::User, &inputs.user, &done[1])]
+        {
             let input = session.voice_input(speaker);
             scope.spawn(move || {
                 for piece in sound.chunks(333) {

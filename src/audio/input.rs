@@ -141,7 +141,8 @@ impl VoiceInput {
         let mut clean = [0.0; PIECE];
         let mut pieces = samples.chunks(PIECE).map(|piece| {
             let not_finite = piece.iter().filter(|s| !s.is_finite()).count();
-            let clipped = piece.iter().filter(|s| s.abs() > CLIP).count() - piece.iter().filter(|s| s.is_infinite()).count();
+            let clipped =
+                piece.iter().filter(|s| s.abs() > CLIP).count() - piece.iter().filter(|s| s.is_infinite()).count();
             bad += not_finite;
             line.counts.clipped.fetch_add(clipped as u64, Relaxed);
             let cleaned = |s: &f32| if s.is_finite() { s.clamp(-CLIP, CLIP) } else { 0.0 };
@@ -155,7 +156,8 @@ impl VoiceInput {
             let mut record = [0; WORDS];
             for (piece, len) in &mut pieces {
                 record[0] = u64::from(rate) | (len as u64) << 18;
-                let pairs = piece.chunks_exact(2).map(|two| u64::from(two[0].to_bits()) | u64::from(two[1].to_bits()) << 32);
+                let pairs =
+                    piece.chunks_exact(2).map(|two| u64::from(two[0].to_bits()) | u64::from(two[1].to_bits()) << 32);
                 record[1..].iter_mut().zip(pairs).for_each(|(to, word)| *to = word);
                 if inbox.room() <= COMMANDS || !inbox.push(&record[..1 + len.div_ceil(2)]) {
                     line.counts.contended.fetch_add(len as u64, Relaxed);
@@ -167,7 +169,8 @@ impl VoiceInput {
             return done;
         }
         line.counts.non_finite.fetch_add(bad as u64, Relaxed);
-        let message = format!("{bad} of {} pushed samples are not finite numbers; silence is in their place", samples.len());
+        let message =
+            format!("{bad} of {} pushed samples are not finite numbers; silence is in their place", samples.len());
         Err(Error::new(ErrorKind::Audio, message))
     }
 

@@ -68,7 +68,8 @@ impl Setting {
 
 impl Controls {
     pub(super) fn new(engine: &Arc<Engine>, supports: impl Fn(Sampler) -> bool) -> Self {
-        let all = [1, 2, 4].map(Sampler::Midpoint).into_iter().chain((1..=64).map(Sampler::Euler)).chain([Sampler::Single]);
+        let all =
+            [1, 2, 4].map(Sampler::Midpoint).into_iter().chain((1..=64).map(Sampler::Euler)).chain([Sampler::Single]);
         let pending = Pending {
             gaze: Setting::new(),
             guidance: Setting::new(),

@@ -145,7 +145,9 @@ impl HeadTrack {
 
     /// Judges whether the user can have walked to sample `at` from the one before.
     fn judge(&mut self, at: usize) {
-        let (Some(before), Some(&sample)) = (at.checked_sub(1).map(|i| self.samples[i]), self.samples.get(at)) else { return };
+        let (Some(before), Some(&sample)) = (at.checked_sub(1).map(|i| self.samples[i]), self.samples.get(at)) else {
+            return;
+        };
         let reach = TELEPORT_SPEED * (sample.time - before.time).max(SPEED_TIME) as f32;
         let jump = sample.position.distance_squared(before.position) > reach * reach;
         self.stats.teleports = self.stats.teleports + u64::from(jump) - u64::from(sample.jump);
