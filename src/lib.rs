@@ -49,6 +49,8 @@ mod pose;
 #[cfg(feature = "quant")]
 mod quant;
 mod queue;
+mod rig;
+mod scheme;
 mod session;
 mod user;
 mod vae;
@@ -59,10 +61,8 @@ pub use engine::{Engine, Networks};
 pub use error::{Error, ErrorKind, Result};
 pub use frame::{BLOCK_FRAMES, FPS, Frame, Root, SAMPLE_RATE, Sampler, Transform};
 pub use glam;
-pub use pose::{Joint, Rig};
-pub use session::{
-    Budget, Controls, Decision, GazeControl, Governor, Hold, Plan, Session, SessionOptions, SharedSession, Team,
-};
+pub use rig::{Joint, Rig};
+pub use session::{Budget, Controls, Decision, Governor, Hold, Plan, Session, SessionOptions, SharedSession, Team};
 pub use user::HeadInput;
 
 /// What a session counts and measures ([`Session::stats`]).

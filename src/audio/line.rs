@@ -1,9 +1,25 @@
 //! Sound on its way from whoever pushes a voice to the block that hears it: a bounded line of 24 kHz samples with one writer and one
 //! reader at a time, neither of which waits for the other.
 
-use super::voice::VoiceStats;
 use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, fence};
+
+/// What was counted since the voice was made or reset; 24 kHz samples unless said otherwise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct VoiceStats {
+    /// Silence handed out in place of sound that had not come, while the voice was present.
+    pub underrun_samples: u64,
+    /// Dropped because the buffer was full.
+    pub overflow_samples: u64,
+    /// Clipped to 8 times full scale, input samples: a sign of integers pushed as floats.
+    pub clipped_samples: u64,
+    /// NaN or infinity, which silence replaced, input samples.
+    pub non_finite_samples: u64,
+    /// Pushed at a rate out of range and not taken, input samples.
+    pub bad_rate_samples: u64,
+    /// Dropped because another thread was inside this voice's input and lost its core there for long, input samples.
+    pub contended_samples: u64,
+}
 
 /// Samples `taken..written` of an endless stream, at most as many as the capacity. The writer may break the stream off: the reader goes
 /// on after [`Line::cleared`], and what was before is room at once.

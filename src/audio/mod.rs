@@ -16,10 +16,11 @@ mod weights;
 
 pub use encoder::AudioEncoder;
 pub use input::{Speaker, VoiceInput};
+pub use line::VoiceStats;
 pub use resample::{MAX_RATE, MIN_RATE, Resampler, check_rate, resample_to_24k};
 #[cfg(feature = "tract")]
 pub use tract::TractEncoder;
-pub use voice::{VOICE_SECONDS, Voice, VoiceStats};
+pub use voice::{VOICE_SECONDS, Voice};
 pub use weights::{AudioWeights, LayerWeights, check_audio_config};
 
 /// What computes the audio encoder.

@@ -1,29 +1,12 @@
 //! One voice of the conversation: pushed in pieces of any size and rate, taken block by block at 24 kHz.
 
 use super::input::VoiceInput;
-use super::line::Glimpse;
+use super::line::{Glimpse, VoiceStats};
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{BLOCK_SAMPLES, SAMPLE_RATE};
 
 /// Seconds of sound that a [`Voice::new`] holds ahead of the block that was taken last (5.8 MB).
 pub const VOICE_SECONDS: u32 = 60;
-
-/// What was counted since the voice was made or reset; 24 kHz samples unless said otherwise.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct VoiceStats {
-    /// Silence handed out in place of sound that had not come, while the voice was present.
-    pub underrun_samples: u64,
-    /// Dropped because the buffer was full.
-    pub overflow_samples: u64,
-    /// Clipped to 8 times full scale, input samples: a sign of integers pushed as floats.
-    pub clipped_samples: u64,
-    /// NaN or infinity, which silence replaced, input samples.
-    pub non_finite_samples: u64,
-    /// Pushed at a rate out of range and not taken, input samples.
-    pub bad_rate_samples: u64,
-    /// Dropped because another thread was inside this voice's input and lost its core there for long, input samples.
-    pub contended_samples: u64,
-}
 
 /// A voice on the session's time line: sample `n` is heard `n / 24000` s after the session's start.
 ///

@@ -97,3 +97,52 @@ impl std::fmt::Debug for HeadInput {
         f.debug_struct("HeadInput").field("room", &self.shared.samples.room()).finish_non_exhaustive()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::user::Presence;
+
+    const AT: Vec3 = Vec3::new(0.0, 1.6, 2.0);
+
+    #[test]
+    fn an_input_may_be_pushed_into_from_several_threads() {
+        let input = HeadInput::new();
+        std::thread::scope(|scope| {
+            for thread in 0..4u32 {
+                let input = input.clone();
+                scope.spawn(move || (0..500).for_each(|i| input.push(AT, f64::from(4 * i + thread) * 0.01)));
+            }
+        });
+        let mut t = HeadTrack::new();
+        input.drain(&mut t);
+        assert_eq!(t.stats(), TrackStats { accepted: 2_000, ..Default::default() });
+        assert_eq!(t.sample(19.985, 20.0).presence, Presence::Measured);
+        // Nobody polls: the newest stay.
+        (0..9_000).for_each(|i| input.push(AT, 20.0 + f64::from(i) * 0.01));
+        let mut t = HeadTrack::new();
+        input.drain(&mut t);
+        assert_eq!(t.stats().accepted, 8_192);
+        input.push(Vec3::NAN, 1.0);
+        input.push(AT, 1e9);
+        let want = TrackStats { accepted: 8_192, overwritten: 808, non_finite: 1, absurd: 1, ..Default::default() };
+        assert_eq!(input.stats(&t), want);
+        input.push(AT, 1.0);
+        input.reset();
+        input.drain(&mut t);
+        assert_eq!(input.stats(&t), TrackStats { accepted: 8_192, ..Default::default() });
+        assert_eq!([28.07, 109.99].map(|time| t.sample(time, 200.0).presence), [Presence::Absent, Presence::Measured]);
+    }
+
+    #[test]
+    fn a_block_is_four_frames() {
+        let samples: Vec<_> = (0..90).map(|i| (i as f32 / 90.0, f64::from(i) / 90.0)).collect();
+        let mut t = track(&samples);
+        let mut out = [ABSENT; 4];
+        t.block(10, 0.5, &mut out);
+        for (i, sample) in out.iter().enumerate() {
+            assert_eq!(sample.presence, Presence::Measured);
+            assert!((sample.position.x - (10 + i) as f32 / 30.0).abs() < 1e-6);
+        }
+    }
+}

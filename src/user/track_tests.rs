@@ -1,4 +1,3 @@
-use super::super::HeadInput;
 use super::*;
 use proptest::prelude::*;
 
@@ -118,47 +117,6 @@ fn a_full_track_keeps_the_newest() {
     [0.3, 0.2, 0.1].into_iter().for_each(|time| t.push(at(time as f32), time));
     assert_eq!(t.stats(), TrackStats { accepted: 2, overwritten: 1, ..Default::default() });
     assert_eq!(t.sample(0.25, 1.0), measured(0.25));
-}
-
-#[test]
-fn an_input_may_be_pushed_into_from_several_threads() {
-    let input = HeadInput::new();
-    std::thread::scope(|scope| {
-        for thread in 0..4u32 {
-            let input = input.clone();
-            scope.spawn(move || (0..500).for_each(|i| input.push(at(0.0), f64::from(4 * i + thread) * 0.01)));
-        }
-    });
-    let mut t = HeadTrack::new();
-    input.drain(&mut t);
-    assert_eq!(t.stats(), TrackStats { accepted: 2_000, ..Default::default() });
-    assert_eq!(t.sample(19.985, 20.0), measured(0.0));
-    // Nobody polls: the newest stay.
-    (0..9_000).for_each(|i| input.push(at(1.0), 20.0 + f64::from(i) * 0.01));
-    let mut t = HeadTrack::new();
-    input.drain(&mut t);
-    assert_eq!(t.stats().accepted, 8_192);
-    input.push(at(f32::NAN), 1.0);
-    input.push(at(0.0), 1e9);
-    let want = TrackStats { accepted: 8_192, overwritten: 808, non_finite: 1, absurd: 1, ..Default::default() };
-    assert_eq!(input.stats(&t), want);
-    input.push(at(0.0), 1.0);
-    input.reset();
-    input.drain(&mut t);
-    assert_eq!(input.stats(&t), TrackStats { accepted: 8_192, ..Default::default() });
-    assert_eq!((t.sample(28.07, 200.0), t.sample(109.99, 200.0)), (ABSENT, measured(1.0)));
-}
-
-#[test]
-fn a_block_is_four_frames() {
-    let samples: Vec<_> = (0..90).map(|i| (i as f32 / 90.0, f64::from(i) / 90.0)).collect();
-    let mut t = track(&samples);
-    let mut out = [ABSENT; 4];
-    t.block(10, 0.5, &mut out);
-    for (i, sample) in out.iter().enumerate() {
-        assert_eq!(sample.presence, Presence::Measured);
-        assert!((sample.position.x - (10 + i) as f32 / 30.0).abs() < 1e-6);
-    }
 }
 
 proptest! {
