@@ -8,6 +8,7 @@
 //! The feed is one thread's at a time, by `try_lock`. A thread that does not get it leaves what it has in the inbox, and the thread that
 //! has the feed looks there before it starts and after it has let go: nobody waits, and what one thread pushes stays in order.
 
+use super::feed::{Command, Feed};
 use super::line::Line;
 use super::resample::{Resampler, check_rate};
 use crate::error::{Error, ErrorKind, Result};
@@ -67,45 +68,6 @@ struct Shared {
     line: Line,
     inbox: Queue<WORDS>,
     feed: Mutex<Feed>,
-}
-
-/// What turns pushed sound into sound of the line.
-#[derive(Default)]
-struct Feed {
-    resampler: Option<Resampler>,
-    /// Made ahead for a rate that is to come.
-    spare: Option<Resampler>,
-}
-
-/// What may be asked of a voice, in order with its sound.
-#[derive(Debug, Clone, Copy)]
-enum Command {
-    Finish,
-    Clear,
-    Present(bool),
-}
-
-impl Command {
-    /// Rates are below 2^18.
-    const FIRST: u64 = 1 << 32;
-
-    fn word(self) -> u64 {
-        Self::FIRST
-            + match self {
-                Self::Finish => 0,
-                Self::Clear => 1,
-                Self::Present(present) => 2 + u64::from(present),
-            }
-    }
-
-    fn of(word: u64) -> Self {
-        match word - Self::FIRST {
-            0 => Self::Finish,
-            1 => Self::Clear,
-            2 => Self::Present(false),
-            _ => Self::Present(true),
-        }
-    }
 }
 
 impl VoiceInput {
@@ -275,57 +237,13 @@ impl Shared {
     }
 }
 
-impl Feed {
-    /// Appends clean samples of a rate that is allowed.
-    fn push(&mut self, line: &Line, samples: &[f32], rate: u32) -> Result<()> {
-        if self.resampler.as_ref().is_none_or(|r| r.rate() != rate) {
-            let next = match self.spare.take_if(|spare| spare.rate() == rate) {
-                Some(spare) => spare,
-                None => Resampler::new(rate)?,
-            };
-            self.finish(line);
-            let more = next.latency_samples().saturating_sub(line.lag());
-            line.set_lag(line.lag() + more);
-            line.push_silence(more);
-            self.resampler = Some(next);
-        }
-        if let Some(resampler) = &mut self.resampler {
-            resampler.push(samples, |s| line.push(s));
-        }
-        line.set_present(true);
-        Ok(())
-    }
-
-    fn finish(&mut self, line: &Line) {
-        if let Some(resampler) = &mut self.resampler {
-            resampler.finish(|s| line.push(s));
-        }
-    }
-
-    fn obey(&mut self, line: &Line, command: Command) {
-        match command {
-            Command::Finish => self.finish(line),
-            Command::Clear => self.clear(line),
-            Command::Present(present) => {
-                if !present {
-                    self.clear(line);
-                }
-                line.set_present(present);
-            }
-        }
-    }
-
-    fn clear(&mut self, line: &Line) {
-        line.clear();
-        if let Some(resampler) = &mut self.resampler {
-            resampler.reset();
-        }
-    }
-}
-
 impl std::fmt::Debug for VoiceInput {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let seconds = self.shared.line.glimpse().written as f64 / f64::from(SAMPLE_RATE);
         f.debug_struct("VoiceInput").field("seconds", &seconds).finish_non_exhaustive()
     }
 }
+
+#[cfg(test)]
+#[path = "input_tests.rs"]
+mod tests;

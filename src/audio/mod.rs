@@ -6,6 +6,7 @@
 //! ```
 
 mod encoder;
+mod feed;
 mod input;
 mod line;
 mod resample;
