@@ -107,6 +107,18 @@ impl Engine {
         Self::from_file(&BundleFile::from_slice(bytes, name), Kernels::detect()?)
     }
 
+    /// Loads the bundle that lies in an open file, `length` bytes from `offset` on (`None`: up to the end), such as an asset that is stored
+    /// uncompressed in an APK. The descriptor stays the caller's; its position is neither used nor moved.
+    ///
+    /// # Errors
+    /// As [`Engine::load`]; [`ErrorKind::Argument`] when the file is shorter.
+    #[cfg(unix)]
+    pub fn from_fd(fd: std::os::fd::BorrowedFd<'_>, offset: u64, length: Option<u64>) -> Result<Arc<Self>> {
+        const NAME: &str = "bundle in an open file";
+        let own = fd.try_clone_to_owned().map_err(|e| Error::io("duplicate the descriptor", NAME, e))?;
+        Self::from_bundle(&BundleFile::open_part(&own.into(), offset, length, NAME)?, Networks::default())
+    }
+
     /// Loads some networks of an opened bundle. The others' tensors are not read, so not checked.
     ///
     /// ```no_run

@@ -23,6 +23,9 @@
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! Voices, head positions and settings may come from other threads, by [`Session::voice_input`], [`Session::head_input`] and
+//! [`Session::controls`]. Whoever pushes never waits for a block, and the same inputs give the same motion, whichever threads they come from.
 #![cfg_attr(visavis_rtsan, feature(sanitize))]
 #![cfg_attr(
     not(feature = "internals"),
@@ -46,20 +49,22 @@ mod par;
 mod pose;
 #[cfg(feature = "quant")]
 mod quant;
+mod queue;
 mod rig;
 mod scheme;
 mod session;
 mod user;
 mod vae;
 
-pub use audio::Voice;
+pub use audio::{Speaker, VoiceInput};
 pub use bundle::{BundleFile, LoadMode};
 pub use engine::{Engine, Networks};
 pub use error::{Error, ErrorKind, Result};
 pub use frame::{BLOCK_FRAMES, EulerSteps, FPS, Frame, Root, SAMPLE_RATE, Sampler, Transform};
 pub use glam;
 pub use rig::{Joint, Rig};
-pub use session::{Budget, Decision, Governor, Hold, Plan, Session, SessionOptions, Team};
+pub use session::{Budget, Controls, Decision, Governor, Hold, Plan, Session, SessionOptions, SharedSession, Team};
+pub use user::HeadInput;
 
 /// What a session counts and measures ([`Session::stats`]).
 pub mod stats {

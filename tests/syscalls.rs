@@ -1,4 +1,4 @@
-//! Computing blocks makes no system call: proved by computing them where one would be fatal.
+//! Neither computing blocks nor pushing makes a system call: proved by computing them where one would be fatal.
 //!
 //! A child process installs a seccomp filter with which the kernel kills it at any system call but write and exit (and the
 //! clock's, which `poll` reads before and after a block, and which is none where the kernel maps the clock). It computes
@@ -11,7 +11,7 @@
 mod common;
 
 use common::{Inputs, tiny};
-use visavis::{Budget, Governor, Sampler, Session, SessionOptions};
+use visavis::{Budget, Governor, Sampler, Session, SessionOptions, Speaker};
 
 /// What became of a child that ran `work` under the filter.
 #[derive(Debug, PartialEq)]
@@ -106,6 +106,26 @@ fn blocks_make_no_system_call() {
         fate => assert_eq!(fate, Fate::Killed, "a system call is fatal in the child"),
     }
     assert_eq!(confined(|| compute(&mut session, 40)), Fate::Through);
+
+    let (voice, head, controls) = (session.voice_input(Speaker::User), session.head_input(), session.controls());
+    let sound = [0.1; 480];
+    let mut pushed = || {
+        for i in 0..40 {
+            let mut all = voice.push(&sound, inputs.rate).is_ok();
+            match i % 8 {
+                1 => voice.finish(),
+                3 => voice.clear(),
+                5 => voice.set_present(i < 20),
+                _ => head.push(glam::Vec3::new(0.0, 1.6, 2.0), session.next_due()),
+            }
+            all &= controls.set_gaze((i % 2 > 0).then_some(0.5)).is_ok();
+            all &= controls.set_sampler([Sampler::Single, Sampler::Midpoint(4)][i % 2]).is_ok();
+            let now = session.next_due();
+            // A panic calls the system, which is fatal.
+            assert!(all && session.poll(now).is_ok_and(|frames| frames.is_some()));
+        }
+    };
+    assert_eq!(confined(&mut pushed), Fate::Through);
 
     session.set_governor(Governor::Budget(Budget::default())).unwrap();
     let governed = |session: &mut Session| {

@@ -8,15 +8,20 @@
  *  - visavis_engine and visavis_session are opaque. Who makes one frees it, once, with visavis_engine_free or
  *    visavis_session_free; freeing NULL does nothing. A session keeps what it needs of its engine: the order of
  *    freeing is free. A pointer that was freed must not be used again.
- *  - Arrays that are passed in stay the caller's and are not kept: they may be changed or freed when the call has returned. A file
- *    descriptor stays the caller's and may be closed when the call has returned.
+ *  - Arrays that are passed in stay the caller's and are not kept: they may be changed or freed when the call has returned, not
+ *    before. A file descriptor stays the caller's and may be closed when the call has returned.
  *  - Arrays and structs that are filled belong to the caller, who gives their size; nothing is written beyond it.
  *  - Strings that are returned belong to the library and must not be freed: names live as long as their engine,
  *    visavis_last_error's text until the next call of this library by the same thread, visavis_version's for ever.
  *
  * THREADS
- *  - An engine may be used by any number of threads at once. A session may move between threads, but one thread at a time: a call
- *    while another thread is inside the same session returns VISAVIS_STATUS_BUSY and does nothing.
+ *  - An engine may be used by any number of threads at once, and so may the inputs and settings of a session: the functions push, finish,
+ *    clear, set and report. They never wait for a block or for another thread, and never return VISAVIS_STATUS_BUSY, whatever the others
+ *    do. A block goes by what came before its poll began: the same inputs give the same motion, whichever threads they come from. A
+ *    voice is one stream: one thread pushes its sound, while commands may come from others. After the first push of a voice, or
+ *    of another rate, pushing does not allocate.
+ *  - All other functions of a session, poll, reset and stats among them, are one thread's at a time, though not always the same one's: such
+ *    a call while another one is under way returns VISAVIS_STATUS_BUSY and does nothing. Freeing is the last call of all.
  *
  * ERRORS
  *  - Functions that can fail return VISAVIS_STATUS_OK (0) or a reason; visavis_last_error then says what is wrong and
@@ -27,7 +32,8 @@
  * VERSIONS
  *  - Call visavis_check_abi(VISAVIS_ABI_VERSION) once. Same major number and a library at least as new as the
  *    header fit together. Structs grow at their end only; each says how large the caller believes it to be (struct_size, or an argument),
- *    so that an old program runs with a new library.
+ *    so that an old program runs with a new library. visavis_joint and visavis_voice_stats never grow. A program that is newer than
+ *    its library is refused with VISAVIS_STATUS_ABI, by visavis_check_abi and where it uses an option that the library does not know.
  */
 
 
@@ -42,8 +48,8 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-// Version of this interface: major number in the upper 16 bits, minor in the lower.
-#define VISAVIS_ABI_VERSION (1 << 16)
+// Version of this interface, 1.1: major number in the upper 16 bits, minor in the lower.
+#define VISAVIS_ABI_VERSION ((1 << 16) | 1)
 
 // Frames that a poll gives when a block is due.
 #define VISAVIS_BLOCK_FRAMES 4
@@ -66,13 +72,13 @@ enum visavis_status
     VISAVIS_STATUS_BUNDLE_VERSION = 4,
     // The bundle's config and tensors disagree.
     VISAVIS_STATUS_BUNDLE_INVALID = 5,
-    // Audio of a bad rate, or samples that are not finite; nothing of the push was taken.
+    // Audio of a bad rate, of which nothing was taken, or samples that are not finite, in whose place there is silence.
     VISAVIS_STATUS_AUDIO = 6,
     // The call does not fit the session's state, for example time that runs backwards.
     VISAVIS_STATUS_STATE = 7,
     // VISAVIS_CPU asks for a level that this CPU does not have.
     VISAVIS_STATUS_CPU_LEVEL = 8,
-    // Another thread is inside this session.
+    // Another thread is inside this session. Pushes and settings never meet this.
     VISAVIS_STATUS_BUSY = 9,
     // Program and library do not fit together.
     VISAVIS_STATUS_ABI = 10,
@@ -271,7 +277,7 @@ typedef struct visavis_stats {
     uint64_t head_accepted;
     // Ignored: not finite.
     uint64_t head_non_finite;
-    // Ignored: not later than the one before.
+    // Ignored: late (a block has used one of that time or later), or at the time of another.
     uint64_t head_out_of_order;
     // Ignored: more than 1 km from the origin, or a time of more than 10 million seconds.
     uint64_t head_absurd;
@@ -293,6 +299,18 @@ typedef struct visavis_stats {
     uint64_t guard_trips;
     // Frames that it held, or faded back.
     uint64_t guard_held_frames;
+    // Since interface 1.1. The agent's voice, input samples: not finite, which silence replaced.
+    uint64_t agent_non_finite_samples;
+    // Pushed at a rate out of range and not taken.
+    uint64_t agent_bad_rate_samples;
+    // Dropped because another thread was inside this voice's input and lost its core there for long.
+    uint64_t agent_contended_samples;
+    // The same for the user's voice.
+    uint64_t user_non_finite_samples;
+    // See agent_bad_rate_samples.
+    uint64_t user_bad_rate_samples;
+    // See agent_contended_samples.
+    uint64_t user_contended_samples;
 } visavis_stats;
 
 #ifdef __cplusplus
@@ -360,7 +378,8 @@ void visavis_session_free(struct visavis_session *session);
 
 // Appends to the agent's own voice: `count` mono samples, full scale 1, of `rate` Hz (8000 to 192000), up to a minute ahead
 // of time. More is dropped and counted. Sound that has not come when a block is computed is silence there, is counted, and
-// is heard later. A voice that was never pushed is absent, which is not the same as silent.
+// is heard later. A voice that was never pushed is absent, which is not the same as silent. Samples that are not finite become
+// silence, are counted, and make the status VISAVIS_STATUS_AUDIO; all others are taken. From any thread, see THREADS.
 visavis_status visavis_session_push_agent_audio(struct visavis_session *session,
                                                 const float *samples,
                                                 size_t count,
@@ -384,8 +403,8 @@ visavis_status visavis_session_set_audio_present(struct visavis_session *session
                                                  int32_t which,
                                                  int32_t present);
 
-// Tells where the user's head is (midpoint of the eyes), world metres, at `time` seconds of session time. Any rate; positions
-// that are not finite, out of order or impossible are ignored and counted (visavis_stats).
+// Tells where the user's head is (midpoint of the eyes), world metres, at `time` seconds of session time. Any rate; positions are put
+// in order by time. Those that are late, not finite or impossible are ignored and counted (visavis_stats). From any thread.
 visavis_status visavis_session_push_user_head(struct visavis_session *session,
                                               float x,
                                               float y,
@@ -431,7 +450,7 @@ visavis_status visavis_session_poll(struct visavis_session *session,
 // Session time at which the next block is due, seconds, into `time`.
 visavis_status visavis_session_next_due(const struct visavis_session *session, double *time);
 
-// Starts anew with the options of now; session time is 0 again. Same inputs, same bits.
+// Starts anew with the options of now; session time is 0 again. Same inputs, same bits. What was pushed before is dropped.
 visavis_status visavis_session_reset(struct visavis_session *session);
 
 // Computes `blocks` blocks for nothing and starts anew, so that memory and CPU are warm when the first block is due.

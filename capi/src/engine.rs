@@ -79,19 +79,13 @@ pub unsafe extern "C" fn visavis_engine_from_fd(
     let load = || {
         #[cfg(unix)]
         {
-            use std::os::fd::BorrowedFd;
-            use visavis::{BundleFile, Networks};
             if fd < 0 {
                 return Err(Failure::argument(format!("file descriptor {fd}")));
             }
             // SAFETY: not -1; an open descriptor for the time of this call, by the ownership chapter. A closed one makes the
             // duplication fail.
-            let borrowed = unsafe { BorrowedFd::borrow_raw(fd) };
-            let name = format!("file descriptor {fd}");
-            let io = |e| visavis::Error::io("duplicate the descriptor", &name, e);
-            let file = std::fs::File::from(borrowed.try_clone_to_owned().map_err(io)?);
-            let part = BundleFile::open_part(&file, offset, (length > 0).then_some(length), &name)?;
-            Ok(Engine::from_bundle(&part, Networks::default())?)
+            let fd = unsafe { std::os::fd::BorrowedFd::borrow_raw(fd) };
+            Ok(Engine::from_fd(fd, offset, (length > 0).then_some(length))?)
         }
         #[cfg(not(unix))]
         {

@@ -2,7 +2,7 @@
 
 use crate::status::{Failure, Outcome, VisavisStatus, guard};
 use crate::structs::{Sized32, check, sized_struct};
-use visavis::{Budget, Governor, Root, Sampler, SessionOptions};
+use visavis::{Governor, Root, Sampler, SessionOptions};
 
 /// How a block is made: evaluations of the network against quality.
 #[repr(i32)]
@@ -55,9 +55,12 @@ pub struct VisavisSessionOptions {
     pub budget_ms: f32,
     /// 0.
     pub reserved: u32,
+    /// Of test builds.
+    #[cfg(feature = "grown")]
+    pub grown: u64,
 }
 
-sized_struct!(VisavisSessionOptions, "visavis_session_options");
+sized_struct!(VisavisSessionOptions, "visavis_session_options", 88);
 
 impl VisavisSessionOptions {
     fn defaults() -> Self {
@@ -79,6 +82,8 @@ impl VisavisSessionOptions {
             guard: 1,
             budget_ms: 0.0,
             reserved: 0,
+            #[cfg(feature = "grown")]
+            grown: crate::structs::GROWN,
         }
     }
 
@@ -90,6 +95,10 @@ impl VisavisSessionOptions {
         let defaults = Self::defaults();
         // SAFETY: the caller's promise.
         let o = if options.is_null() { defaults } else { unsafe { Self::read(options, defaults) }? };
+        #[cfg(feature = "grown")]
+        if o.grown != defaults.grown {
+            return Err(Failure::argument("grown: its default is what an older caller means"));
+        }
         let given = |v: f32| (!v.is_nan()).then_some(v);
         Ok(SessionOptions {
             seed: o.seed,
@@ -103,18 +112,10 @@ impl VisavisSessionOptions {
             start: Root { x: o.start_x, z: o.start_z, yaw: o.start_yaw },
             stance: o.stance != 0,
             guard: o.guard != 0,
-            governor: governor(o.budget_ms),
+            governor: Governor::within(o.budget_ms),
             ..Default::default()
         })
     }
-}
-
-/// No governor for 0, else one with that budget.
-pub(crate) fn governor(budget_ms: f32) -> Governor {
-    if budget_ms == 0.0 {
-        return Governor::Off;
-    }
-    Governor::Budget(Budget { milliseconds: budget_ms, ..Default::default() })
 }
 
 /// The sampler that `kind` and `steps` stand for.

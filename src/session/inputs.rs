@@ -5,7 +5,7 @@ use super::probe::{Probe, tell};
 use super::stats::{Delays, InputStats};
 #[cfg(feature = "tract")]
 use crate::audio::TractEncoder;
-use crate::audio::{AudioBackend, AudioEncoder, Voice};
+use crate::audio::{AudioBackend, AudioEncoder, Speaker, Voice, VoiceInput};
 use crate::config::Config;
 use crate::engine::Engine;
 use crate::error::Result;
@@ -13,7 +13,7 @@ use crate::flow::Condition;
 use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES, FPS, Root};
 use crate::kernels::Exec;
 use crate::session::SessionOptions;
-use crate::user::{HeadTrack, Presence, UserSample};
+use crate::user::{HeadInput, HeadTrack, Presence, UserSample};
 use glam::Vec3;
 
 /// A voice and the encoder that listens to it.
@@ -71,6 +71,7 @@ impl Hearing {
 pub(super) struct Inputs {
     agent: Ear,
     user: Ear,
+    head: HeadInput,
     track: HeadTrack,
     user_delay: u64,
     pub(super) condition: Condition,
@@ -153,6 +154,7 @@ impl Inputs {
         Ok(Self {
             agent: Ear::new(engine, options, engine.config.agent_delay_blocks)?,
             user: Ear::new(engine, options, engine.config.user_delay_blocks)?,
+            head: HeadInput::new(),
             track: HeadTrack::new(),
             user_delay: u64::from(engine.config.user_delay_blocks),
             condition: Condition::absent(engine.layout()),
@@ -163,6 +165,7 @@ impl Inputs {
     pub(super) fn reset(&mut self, first: u64) {
         self.agent.reset(first);
         self.user.reset(first);
+        self.head.reset();
         self.track.reset();
         self.condition.clear();
     }
@@ -173,16 +176,22 @@ impl Inputs {
         self.user.skip(block)
     }
 
-    pub(super) fn agent_voice(&mut self) -> &mut Voice {
-        &mut self.agent.voice
+    /// Takes notice of what was pushed since the last time: the coming blocks know that and no more.
+    pub(super) fn look(&mut self) {
+        self.agent.voice.look();
+        self.user.voice.look();
+        self.head.drain(&mut self.track);
     }
 
-    pub(super) fn user_voice(&mut self) -> &mut Voice {
-        &mut self.user.voice
+    pub(super) fn voice(&self, speaker: Speaker) -> &VoiceInput {
+        match speaker {
+            Speaker::Agent => self.agent.voice.input(),
+            Speaker::User => self.user.voice.input(),
+        }
     }
 
-    pub(super) fn push_head(&mut self, position: Vec3, time: f64) {
-        self.track.push(position, time);
+    pub(super) fn head(&self) -> &HeadInput {
+        &self.head
     }
 
     /// World position of the user's head in frame `frame`, as far as it is known at the start of its block.
@@ -245,7 +254,7 @@ impl Inputs {
         InputStats {
             agent_voice: self.agent.voice.stats(),
             user_voice: self.user.voice.stats(),
-            head: self.track.stats(),
+            head: self.head.stats(&self.track),
         }
     }
 

@@ -49,10 +49,11 @@ impl Session {
         outcome.map(|()| Some(self.state.frames.as_slice()))
     }
 
-    /// Sets the time; whether a block is due.
+    /// Sets the time, takes notice of what came from other threads; whether a block is due.
     pub(super) fn is_due(&mut self, now: f64) -> Result<bool> {
         self.check_time(now)?;
         self.now = now;
+        self.take_notice();
         Ok(now >= self.next_due() - 1e-9)
     }
 
@@ -97,8 +98,9 @@ impl Session {
         Ok(())
     }
 
-    /// Forgets times and decisions.
+    /// Takes notice of what was set before; forgets times and decisions.
     pub(super) fn forget(&mut self) {
+        self.take_notice();
         self.now = 0.0;
         self.times.clear();
         self.log.clear();
