@@ -117,7 +117,7 @@ fn nobody_waits_for_who_has_the_session() {
             .join()
             .unwrap();
     });
-    assert_eq!((held.sampler(), held.options().sampler), (Sampler::Single, Sampler::Midpoint(4)));
+    assert_eq!((held.sampler(), held.options().sampler), (Sampler::Single, Sampler::Midpoint4));
     assert_eq!(held.poll(0.0).unwrap().unwrap()[0].sampler, Sampler::Single);
     let options = held.options();
     assert_eq!((options.gaze, options.guidance, options.gaze_guidance), (None, Some(1.0), Some(1.0)));
@@ -134,19 +134,19 @@ fn settings_from_elsewhere_are_those_of_the_session() {
     assert_eq!(a, b);
     here.set_gaze(Some(-0.5)).unwrap();
     here.set_guidance(1.7, 3.0).unwrap();
-    here.set_sampler(Sampler::Midpoint(2)).unwrap();
+    here.set_sampler(Sampler::Midpoint2).unwrap();
     // The last one counts; what the session's owner sets comes after what was set before.
     controls.set_gaze(Some(0.3)).unwrap();
     controls.set_gaze(Some(-0.5)).unwrap();
     controls.set_guidance(1.7, 3.0).unwrap();
     controls.set_sampler(Sampler::Single).unwrap();
-    there.set_sampler(Sampler::Midpoint(2)).unwrap();
+    there.set_sampler(Sampler::Midpoint2).unwrap();
     assert_eq!(poll_blocks(&mut there, 6), poll_blocks(&mut here, 6));
 
     for e in [
         controls.set_gaze(Some(f32::NAN)).unwrap_err(),
         controls.set_guidance(-1.0, 0.0).unwrap_err(),
-        controls.set_sampler(Sampler::Euler(5)).unwrap_err(),
+        controls.set_sampler(Sampler::euler(5).unwrap()).unwrap_err(),
         controls.set_budget(0.5).unwrap_err(),
         controls.report_block_time(f64::INFINITY).unwrap_err(),
     ] {
