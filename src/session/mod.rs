@@ -89,7 +89,7 @@ impl Session {
     pub(crate) fn new(engine: Arc<Engine>, options: SessionOptions) -> Result<Self> {
         options.check(&engine)?;
         let mut exec = engine.exec(options.threads)?;
-        options.core_mask.map_or(Ok(()), |mask| exec.pool().pin_helper(mask))?;
+        options.core_mask.map_or(Ok(()), |mask| exec.pool_mut().pin_helper(mask))?;
         let state = BlockState::new(&mut exec, &engine, &options)?;
         let times = stats::BlockTimes::new();
         let (log, policy, last) = (Log::new(), None, None);
