@@ -86,7 +86,7 @@ impl Beside {
                 }
                 controls.set_gaze((round % 2 > 0).then_some(0.5)).unwrap();
                 controls.set_guidance(1.3, 2.5).unwrap();
-                controls.set_sampler([Sampler::Single, Sampler::Midpoint(4)][round as usize % 2]).unwrap();
+                controls.set_sampler([Sampler::Single, Sampler::Midpoint4][round as usize % 2]).unwrap();
                 counting.fetch_add(1, Ordering::Release);
                 if stopped.load(Ordering::Acquire) {
                     return;

@@ -119,7 +119,7 @@ fn blocks_make_no_system_call() {
                 _ => head.push(glam::Vec3::new(0.0, 1.6, 2.0), session.next_due()),
             }
             all &= controls.set_gaze((i % 2 > 0).then_some(0.5)).is_ok();
-            all &= controls.set_sampler([Sampler::Single, Sampler::Midpoint(4)][i % 2]).is_ok();
+            all &= controls.set_sampler([Sampler::Single, Sampler::Midpoint4][i % 2]).is_ok();
             let now = session.next_due();
             // A panic calls the system, which is fatal.
             assert!(all && session.poll(now).is_ok_and(|frames| frames.is_some()));
