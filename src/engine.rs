@@ -325,7 +325,7 @@ impl Engine {
             [c.vae.width * c.vae.mlp.max(3), self.features(), 4 * c.audio.features, c.vae.latent, c.flow.tau_width];
         let width = flow.into_iter().chain(rest).fold(audio, usize::max);
         // Voices are what is shared out whole.
-        Exec::new(self.kernels, threads, Limits { rows, width })?.with_lanes(Limits { rows, width: audio })
+        Exec::new(self.kernels, threads, Limits { rows, width })?.with_workers(Limits { rows, width: audio })
     }
 }
 

@@ -1,18 +1,19 @@
-//! Things that networks are run on, shared out whole: each to one thread, which has an [`Exec`] of its own.
+//! Things that networks are run on, shared out whole: each to one thread, which has an [`Exec`] of
+//! its own.
 
 use super::{Exec, Limits};
 use crate::error::Result;
 use crate::par::Pool;
 
 impl Exec {
-    /// The same with scratch of `limits` for each of two threads, if it has two: [`Exec::each`] shares out what keeps
-    /// within them.
+    /// The same with scratch of `limits` for each of two threads, if it has two: [`Exec::each`]
+    /// shares out what keeps within them.
     ///
     /// # Errors
     /// As [`Exec::new`].
-    pub fn with_lanes(mut self, limits: Limits) -> Result<Self> {
-        let lane = || Exec::new(self.kernels, 1, limits);
-        self.lanes = if self.threads() == 2 { Some(Box::new([lane()?, lane()?])) } else { None };
+    pub fn with_workers(mut self, limits: Limits) -> Result<Self> {
+        let worker = || Exec::new(self.kernels, 1, limits);
+        self.workers = if self.threads() == 2 { Some(Box::new([worker()?, worker()?])) } else { None };
         Ok(self)
     }
 
@@ -21,17 +22,17 @@ impl Exec {
         &mut self.pool
     }
 
-    /// Calls `work` once for each of `items`: side by side, with an `Exec` of one thread each, or, where there is one
-    /// item only or there are no [lanes](Exec::with_lanes), one after the other with this one. What comes out has the
-    /// same bits.
+    /// Calls `work` once for each of `items`: side by side, with an `Exec` of one thread each, or,
+    /// where there is one item only or there are no [workers](Exec::with_workers), one after the
+    /// other with this one. What comes out has the same bits.
     ///
     /// # Panics
     /// With the panic of one of them.
     pub fn each<T: Send>(&mut self, items: &mut [T], work: impl Fn(&mut Exec, &mut T) + Sync) {
         // Whoever listens to activations listens to this one.
-        let lanes = if items.len() < 2 || self.activations.is_some() { None } else { self.lanes.as_deref_mut() };
-        match lanes {
-            Some(lanes) => self.pool.each_with(lanes, items, |lane, _, item| work(lane, item)),
+        let alone = items.len() < 2 || self.activations.is_some();
+        match if alone { None } else { self.workers.as_deref_mut() } {
+            Some(workers) => self.pool.each_with(workers, items, |worker, _, item| work(worker, item)),
             None => items.iter_mut().for_each(|item| work(self, item)),
         }
     }
@@ -62,7 +63,7 @@ mod tests {
             });
             let expected: Vec<_> = expected.collect();
             for threads in [1, 2] {
-                let mut exec = Exec::new(kernels, threads, limits).unwrap().with_lanes(limits).unwrap();
+                let mut exec = Exec::new(kernels, threads, limits).unwrap().with_workers(limits).unwrap();
                 for count in 0..inputs.len() {
                     let mut items: Vec<_> = inputs[..count].iter().map(|x| (x, vec![0.0; ROWS * out])).collect();
                     exec.begin();
