@@ -296,7 +296,8 @@ impl Probe for Decoded {
 fn an_unusable_latent_is_a_block_without_features() {
     let engine = tiny();
     let (idle, latent) = (engine.idle_blocks(), engine.config().vae.latent);
-    for (sampler, rubbish) in [(Sampler::Midpoint4, f32::NAN), (Sampler::Midpoint2, 1e30), (Sampler::Single, f32::NAN)]
+    for (sampler, rubbish) in
+        [(Sampler::Midpoint4, f32::NAN), (Sampler::Midpoint2, f32::INFINITY), (Sampler::Single, f32::NAN)]
     {
         let mut noise = vec![0.1; (idle + 5) * latent];
         noise.extend(vec![rubbish; latent]);
