@@ -133,16 +133,4 @@ mod tests {
         assert_eq!(input.stats(&t), TrackStats { accepted: 8_192, ..Default::default() });
         assert_eq!([28.07, 109.99].map(|time| t.sample(time, 200.0).presence), [Presence::Absent, Presence::Measured]);
     }
-
-    #[test]
-    fn a_block_is_four_frames() {
-        let samples: Vec<_> = (0..90).map(|i| (i as f32 / 90.0, f64::from(i) / 90.0)).collect();
-        let mut t = track(&samples);
-        let mut out = [ABSENT; 4];
-        t.block(10, 0.5, &mut out);
-        for (i, sample) in out.iter().enumerate() {
-            assert_eq!(sample.presence, Presence::Measured);
-            assert!((sample.position.x - (10 + i) as f32 / 30.0).abs() < 1e-6);
-        }
-    }
 }
