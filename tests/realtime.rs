@@ -1,6 +1,7 @@
 //! A running session computes blocks without allocating: proved with an allocator that counts.
 //!
-//! One test in one binary, without the test harness: its threads allocate too, as when it tells that a test takes long.
+//! One test in one binary, without the test harness: its threads allocate too, as when it tells
+//! that a test takes long.
 
 mod common;
 
@@ -44,7 +45,8 @@ unsafe impl GlobalAlloc for Counting {
 
     unsafe fn realloc(&self, ptr: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         count();
-        // SAFETY: `ptr` came from `System` with this layout; the caller keeps the contract of `realloc`.
+        // SAFETY: `ptr` came from `System` with this layout; the caller keeps the contract of
+        // `realloc`.
         unsafe { System.realloc(ptr, layout, size) }
     }
 }
@@ -60,7 +62,8 @@ fn allocations(work: impl FnOnce()) -> u64 {
     CALLS.load(Ordering::SeqCst)
 }
 
-/// A thread that pushes into a session and sets what it goes by, as trackers, microphones and user interfaces do.
+/// A thread that pushes into a session and sets what it goes by, as trackers, microphones and user
+/// interfaces do.
 struct Beside {
     rounds: Arc<AtomicU64>,
     stop: Arc<AtomicBool>,
@@ -86,7 +89,7 @@ impl Beside {
                 }
                 controls.set_gaze((round % 2 > 0).then_some(0.5)).unwrap();
                 controls.set_guidance(1.3, 2.5).unwrap();
-                controls.set_sampler([Sampler::Single, Sampler::Midpoint(4)][round as usize % 2]).unwrap();
+                controls.set_sampler([Sampler::Single, Sampler::Midpoint4][round as usize % 2]).unwrap();
                 counting.fetch_add(1, Ordering::Release);
                 if stopped.load(Ordering::Acquire) {
                     return;
@@ -111,9 +114,10 @@ impl Beside {
     }
 }
 
-/// Every sampler, one and two threads, gaze on and off, sampler changes with their catching up, re-anchoring, the governor,
-/// voices of a rate that is resampled, weights of every scheme: after the first push of each voice, neither pushing nor
-/// computing allocates; nor does another thread that pushes and sets meanwhile.
+/// Every sampler, one and two threads, gaze on and off, sampler changes with their catching up,
+/// re-anchoring, the governor, voices of a rate that is resampled, weights of every scheme: after
+/// the first push of each voice, neither pushing nor computing allocates; nor does another thread
+/// that pushes and sets meanwhile.
 fn a_running_session_does_not_allocate() {
     assert!(allocations(|| drop(std::hint::black_box(vec![1u8]))) > 0, "the allocator counts");
     let inputs = Inputs::circling(20.0, 48_000);
@@ -128,7 +132,7 @@ fn a_running_session_does_not_allocate() {
         session.push_user_audio(user.next().unwrap(), inputs.rate).unwrap();
 
         let samplers =
-            [Sampler::Midpoint(4), Sampler::Single, Sampler::Midpoint(1), Sampler::Euler(8), Sampler::Midpoint(2)];
+            [Sampler::Midpoint4, Sampler::Single, Sampler::Midpoint1, Sampler::euler(8).unwrap(), Sampler::Midpoint2];
         let calls = allocations(|| {
             for block in 0..100 {
                 session.set_sampler(samplers[block / 7 % samplers.len()]).unwrap();
@@ -161,8 +165,9 @@ fn a_running_session_does_not_allocate() {
         beside.end();
         session.set_gaze(None).unwrap();
 
-        // The governor with all it does: down the ladder, holding, rehearsing, catching up, and its record of that.
-        session.set_sampler(Sampler::Midpoint(4)).unwrap();
+        // The governor with all it does: down the ladder, holding, rehearsing, catching up, and its
+        // record of that.
+        session.set_sampler(Sampler::Midpoint4).unwrap();
         session.set_governor(Governor::Budget(Budget::default())).unwrap();
         let calls = allocations(|| {
             for block in 0..300 {
@@ -205,7 +210,7 @@ fn a_running_session_does_not_allocate() {
         let calls = allocations(|| {
             for block in 1..40 {
                 due.iter_mut().for_each(|(session, now)| *now = session.next_due());
-                due[4].0.set_sampler([Sampler::Midpoint(4), Sampler::Single][block / 7 % 2]).unwrap();
+                due[4].0.set_sampler([Sampler::Midpoint4, Sampler::Single][block / 7 % 2]).unwrap();
                 assert_eq!(team.step(&mut due).unwrap(), 5);
             }
         });

@@ -1,5 +1,5 @@
-//! A caller that does anything in any order: sizes, rates, NaN, time that goes back, options that change. Frames are finite and
-//! in order, errors are typed, nothing else happens.
+//! A caller that does anything in any order: sizes, rates, NaN, time that goes back, options that
+//! change. Frames are finite and in order, errors are typed, nothing else happens.
 #![no_main]
 
 use arbitrary::{Arbitrary, Unstructured};
@@ -11,8 +11,9 @@ use visavis::{Budget, ErrorKind, Governor, Root, Sampler, Session, SessionOption
 use visavis_fuzz::{engine, student};
 
 thread_local! {
-    /// The session of most executions, of an engine with the student alone: making one takes longer than using it, and a reset is to
-    /// leave nothing behind. One execution in eight makes its own, with both networks.
+    /// The session of most executions, of an engine with the student alone: making one takes longer
+    /// than using it, and a reset is to leave nothing behind. One execution in eight makes its own,
+    /// with both networks.
     static KEPT: RefCell<Option<Session>> = const { RefCell::new(None) };
 }
 
@@ -59,12 +60,12 @@ enum Step {
 
 fn sampler(i: u8) -> Sampler {
     match i % 6 {
-        0 => Sampler::Midpoint(4),
-        1 => Sampler::Midpoint(i / 6),
+        0 => Sampler::Midpoint4,
+        1 => Sampler::Midpoint1,
         // Mostly few steps.
-        2 if i < 252 => Sampler::Euler(i / 6 % 4),
-        2 => Sampler::Euler(i - 190),
-        3 => Sampler::Midpoint(2),
+        2 if i < 252 => Sampler::euler(1 + i / 6 % 4).expect("1 to 4 steps"),
+        2 => Sampler::euler(i - 190).expect("62 steps and more"),
+        3 => Sampler::Midpoint2,
         _ => Sampler::Single,
     }
 }
