@@ -2,7 +2,7 @@
 
 use super::governor::{self, Decision, Governor, GovernorStats, Hold, Plan, Policy};
 use super::{Session, options};
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::Result;
 use crate::frame::Sampler;
 
 impl Session {
