@@ -1,8 +1,8 @@
-//! A runtime that gives a virtual agent a body: full-body motion that talks, listens, turns to the person in front of it
-//! and keeps as much eye contact as it is told to.
+//! A runtime that gives a virtual agent a body: full-body motion that talks, listens, turns to the
+//! person in front of it and keeps as much eye contact as it is told to.
 //!
-//! It hears the agent's and the user's voice, sees where the user's head is, and streams poses at 30 frames a second:
-//! causal, offline, on one or two CPU cores.
+//! It hears the agent's and the user's voice, sees where the user's head is, and streams poses at
+//! 30 frames a second: causal, offline, on one or two CPU cores.
 //!
 //! ```no_run
 //! use visavis::{Engine, SessionOptions};
@@ -24,8 +24,9 @@
 //! # }
 //! ```
 //!
-//! Voices, head positions and settings may come from other threads, by [`Session::voice_input`], [`Session::head_input`] and
-//! [`Session::controls`]. Whoever pushes never waits for a block, and the same inputs give the same motion, whichever threads they come from.
+//! Voices, head positions and settings may come from other threads, by [`Session::voice_input`],
+//! [`Session::head_input`] and [`Session::controls`]. Whoever pushes never waits for a block, and
+//! the same inputs give the same motion, whichever threads they come from.
 #![cfg_attr(visavis_rtsan, feature(sanitize))]
 #![cfg_attr(
     not(feature = "internals"),
@@ -84,8 +85,8 @@ pub mod threads {
     pub use crate::par::{current_thread_id, pin_current_thread};
 }
 
-/// The rooms of this crate, for its own tools, tests, benchmarks and fuzz targets. Nothing in here keeps its shape from one
-/// version to the next, patches included.
+/// The rooms of this crate, for its own tools, tests, benchmarks and fuzz targets. Nothing in here
+/// keeps its shape from one version to the next, patches included.
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod internals {

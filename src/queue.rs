@@ -1,18 +1,22 @@
 //! A bounded queue of small records between threads that must not wait for each other.
 //!
-//! Vyukov's bounded queue, with records of atomic words in place of raw memory, and without its spinning: a writer that lost its core
-//! in the middle of a record hides that record, and those behind it, until it goes on. Nobody waits for it. (The queues of
-//! `crossbeam-queue` and `concurrent-queue` spin in such a case: a thread with a deadline would wait for one without a core.)
+//! Vyukov's bounded queue, with records of atomic words in place of raw memory, and without its
+//! spinning: a writer that lost its core in the middle of a record hides that record, and those
+//! behind it, until it goes on. Nobody waits for it. (The queues of `crossbeam-queue` and
+//! `concurrent-queue` spin in such a case: a thread with a deadline would wait for one without a
+//! core.)
 
 use std::cmp::Ordering::{Equal, Greater, Less};
 use std::sync::atomic::AtomicU64;
 use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 
-/// Any number of threads write records of up to `WORDS` words, any number read them; each record is read once, in the order in which
-/// writers took their places. Nothing here waits, or allocates after the queue was made.
+/// Any number of threads write records of up to `WORDS` words, any number read them; each record is
+/// read once, in the order in which writers took their places. Nothing here waits, or allocates
+/// after the queue was made.
 pub(crate) struct Queue<const WORDS: usize> {
-    /// For each place its state, then its record. The state is `2 lap` when the place is free for lap `lap`, `2 lap + 1` when it holds
-    /// that lap's record: zeros are an empty queue, and untouched places take no memory.
+    /// For each place its state, then its record. The state is `2 lap` when the place is free for
+    /// lap `lap`, `2 lap + 1` when it holds that lap's record: zeros are an empty queue, and
+    /// untouched places take no memory.
     places: Box<[AtomicU64]>,
     capacity: u64,
     /// Records whose places writers have taken, and that readers have.
@@ -60,8 +64,8 @@ impl<const WORDS: usize> Queue<WORDS> {
         }
     }
 
-    /// Takes the oldest record into `record` (of which words beyond its own mean nothing); false when there is none, or when it is still
-    /// being written.
+    /// Takes the oldest record into `record` (of which words beyond its own mean nothing); false
+    /// when there is none, or when it is still being written.
     pub(crate) fn pop(&self, record: &mut [u64; WORDS]) -> bool {
         let mut at = self.head.load(Relaxed);
         loop {

@@ -1,5 +1,5 @@
-//! What a session promises to those who push into it from other threads: they never wait, nothing that is in time is lost, and the
-//! motion is that of the same inputs pushed in one thread.
+//! What a session promises to those who push into it from other threads: they never wait, nothing
+//! that is in time is lost, and the motion is that of the same inputs pushed in one thread.
 
 mod common;
 
@@ -23,7 +23,8 @@ fn session() -> Session {
     tiny().session(options()).unwrap()
 }
 
-/// Voices in pieces, each by a thread of its own, and the head by three, all before the first block.
+/// Voices in pieces, each by a thread of its own, and the head by three, all before the first
+/// block.
 #[test]
 fn who_pushes_what_does_not_change_a_bit() {
     let inputs = inputs(44_100);
@@ -47,7 +48,8 @@ fn who_pushes_what_does_not_change_a_bit() {
     }
 }
 
-/// Threads push while blocks are computed, each block's inputs before its poll and the rest whenever they like.
+/// Threads push while blocks are computed, each block's inputs before its poll and the rest
+/// whenever they like.
 #[test]
 fn when_it_is_pushed_does_not_change_a_bit() {
     let inputs = inputs(24_000);
@@ -88,7 +90,8 @@ fn when_it_is_pushed_does_not_change_a_bit() {
     assert_eq!(frames, whole);
 }
 
-/// With the session in another thread's hands all pushes and settings come back: one that waited would never.
+/// With the session in another thread's hands all pushes and settings come back: one that waited
+/// would never.
 #[test]
 fn nobody_waits_for_who_has_the_session() {
     let shared = SharedSession::new(session());
@@ -155,7 +158,8 @@ fn settings_from_elsewhere_are_those_of_the_session() {
     assert_eq!(poll_blocks(&mut there, 2), poll_blocks(&mut here, 2));
 }
 
-/// Bad samples are silence, the good ones around them are heard; a bad rate takes nothing; both are counted.
+/// Bad samples are silence, the good ones around them are heard; a bad rate takes nothing; both are
+/// counted.
 #[test]
 fn bad_sound_is_an_error_that_keeps_what_was_good() {
     let (mut bad, mut good) = (session(), session());
@@ -174,7 +178,8 @@ fn bad_sound_is_an_error_that_keeps_what_was_good() {
     }
 }
 
-/// A minute may be pushed ahead, by one thread or in turns with commands; more is dropped and counted.
+/// A minute may be pushed ahead, by one thread or in turns with commands; more is dropped and
+/// counted.
 #[test]
 fn a_minute_is_kept() {
     let mut session = session();
@@ -201,7 +206,8 @@ fn a_minute_is_kept() {
     assert_eq!(session.stats().inputs.agent_voice.underrun_samples, 0);
 }
 
-/// Positions come by two ways, one of them late: what no block has used is put in order, the rest is counted.
+/// Positions come by two ways, one of them late: what no block has used is put in order, the rest
+/// is counted.
 #[test]
 fn heads_are_put_in_order_until_they_are_used() {
     let inputs = inputs(24_000);

@@ -1,6 +1,7 @@
 //! A running session computes blocks without allocating: proved with an allocator that counts.
 //!
-//! One test in one binary, without the test harness: its threads allocate too, as when it tells that a test takes long.
+//! One test in one binary, without the test harness: its threads allocate too, as when it tells
+//! that a test takes long.
 
 mod common;
 
@@ -44,7 +45,8 @@ unsafe impl GlobalAlloc for Counting {
 
     unsafe fn realloc(&self, ptr: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         count();
-        // SAFETY: `ptr` came from `System` with this layout; the caller keeps the contract of `realloc`.
+        // SAFETY: `ptr` came from `System` with this layout; the caller keeps the contract of
+        // `realloc`.
         unsafe { System.realloc(ptr, layout, size) }
     }
 }
@@ -60,7 +62,8 @@ fn allocations(work: impl FnOnce()) -> u64 {
     CALLS.load(Ordering::SeqCst)
 }
 
-/// A thread that pushes into a session and sets what it goes by, as trackers, microphones and user interfaces do.
+/// A thread that pushes into a session and sets what it goes by, as trackers, microphones and user
+/// interfaces do.
 struct Beside {
     rounds: Arc<AtomicU64>,
     stop: Arc<AtomicBool>,
@@ -111,9 +114,10 @@ impl Beside {
     }
 }
 
-/// Every sampler, one and two threads, gaze on and off, sampler changes with their catching up, re-anchoring, the governor,
-/// voices of a rate that is resampled, weights of every scheme: after the first push of each voice, neither pushing nor
-/// computing allocates; nor does another thread that pushes and sets meanwhile.
+/// Every sampler, one and two threads, gaze on and off, sampler changes with their catching up,
+/// re-anchoring, the governor, voices of a rate that is resampled, weights of every scheme: after
+/// the first push of each voice, neither pushing nor computing allocates; nor does another thread
+/// that pushes and sets meanwhile.
 fn a_running_session_does_not_allocate() {
     assert!(allocations(|| drop(std::hint::black_box(vec![1u8]))) > 0, "the allocator counts");
     let inputs = Inputs::circling(20.0, 48_000);
@@ -161,7 +165,8 @@ fn a_running_session_does_not_allocate() {
         beside.end();
         session.set_gaze(None).unwrap();
 
-        // The governor with all it does: down the ladder, holding, rehearsing, catching up, and its record of that.
+        // The governor with all it does: down the ladder, holding, rehearsing, catching up, and its
+        // record of that.
         session.set_sampler(Sampler::Midpoint4).unwrap();
         session.set_governor(Governor::Budget(Budget::default())).unwrap();
         let calls = allocations(|| {

@@ -1,10 +1,12 @@
-//! Neither computing blocks nor pushing makes a system call: proved by computing them where one would be fatal.
+//! Neither computing blocks nor pushing makes a system call: proved by computing them where one
+//! would be fatal.
 //!
-//! A child process installs a seccomp filter with which the kernel kills it at any system call but write and exit (and the
-//! clock's, which `poll` reads before and after a block, and which is none where the kernel maps the clock). It computes
-//! blocks and writes one byte to say that it is through. Sleeping on a contended lock, allocating from the system,
-//! starting a thread or reading the environment would all be fatal. One test in one binary: the child of a fork has
-//! only the thread that forked.
+//! A child process installs a seccomp filter with which the kernel kills it at any system call but
+//! write and exit (and the clock's, which `poll` reads before and after a block, and which is none
+//! where the kernel maps the clock). It computes blocks and writes one byte to say that it is
+//! through. Sleeping on a contended lock, allocating from the system, starting a thread or reading
+//! the environment would all be fatal. One test in one binary: the child of a fork has only the
+//! thread that forked.
 #![cfg(target_os = "linux")]
 #![allow(unsafe_code, reason = "fork, prctl and exit are unsafe by nature")]
 
@@ -28,7 +30,8 @@ fn confined(work: impl FnOnce()) -> Fate {
     let mut ends = [0; 2];
     // SAFETY: `ends` has room for both ends of the pipe.
     assert_eq!(unsafe { libc::pipe(ends.as_mut_ptr()) }, 0);
-    // SAFETY: the child calls nothing that needs another thread: neither it nor the blocks it computes allocate or lock.
+    // SAFETY: the child calls nothing that needs another thread: neither it nor the blocks it
+    // computes allocate or lock.
     let child = unsafe { libc::fork() };
     assert!(child >= 0, "fork");
     if child == 0 {
@@ -76,7 +79,8 @@ fn confine() -> bool {
         step(RETURN, libc::SECCOMP_RET_ALLOW, 0),
     ];
     let filter = libc::sock_fprog { len: program.len() as u16, filter: program.as_mut_ptr() };
-    // SAFETY: plain numbers; `filter` and the program it points to outlive the call, which copies them.
+    // SAFETY: plain numbers; `filter` and the program it points to outlive the call, which copies
+    // them.
     unsafe {
         libc::prctl(libc::PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0
             && libc::prctl(libc::PR_SET_SECCOMP, libc::SECCOMP_MODE_FILTER, std::ptr::from_ref(&filter)) == 0

@@ -45,7 +45,8 @@ const _: () = assert!(size_of::<VisavisJoint>() == 44);
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct VisavisJoint {
-    /// Rotation relative to the parent on the rig with fixed bone lengths (hips: relative to the world): for humanoid rigs.
+    /// Rotation relative to the parent on the rig with fixed bone lengths (hips: relative to the
+    /// world): for humanoid rigs.
     pub local: [f32; 4],
     /// Decoded position in the world.
     pub position: [f32; 3],
@@ -82,13 +83,15 @@ impl VisavisFrame {
         Err(Failure::new(VisavisStatus::Abi, message))
     }
 
-    /// Writes as much of the frame as the caller's struct of `size` bytes holds; bytes beyond are zeroed.
+    /// Writes as much of the frame as the caller's struct of `size` bytes holds; bytes beyond are
+    /// zeroed.
     ///
     /// # Safety
     /// `to` has room for `size` bytes.
     pub(crate) unsafe fn write(&self, to: *mut u8, size: usize) {
         let known = size.min(size_of::<Self>());
-        // SAFETY: `known` bytes are inside both; what follows, up to `size`, is the caller's promise.
+        // SAFETY: `known` bytes are inside both; what follows, up to `size`, is the caller's
+        // promise.
         unsafe {
             to.copy_from_nonoverlapping((&raw const *self).cast::<u8>(), known);
             to.add(known).write_bytes(0, size - known);

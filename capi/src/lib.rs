@@ -1,8 +1,8 @@
-//! The C interface of Visavis. What a C programmer reads is `include/visavis.h`, generated from this crate; the ownership
-//! chapter at its head (`header.txt`) holds for every function here.
+//! The C interface of Visavis. What a C programmer reads is `include/visavis.h`, generated from
+//! this crate; the ownership chapter at its head (`header.txt`) holds for every function here.
 //!
-//! Each function runs inside [`status::guard`]: null and misaligned pointers, bad values and panics become a status, and the
-//! text of [`visavis_last_error`].
+//! Each function runs inside [`status::guard`]: null and misaligned pointers, bad values and panics
+//! become a status, and the text of [`visavis_last_error`].
 
 mod engine;
 mod frames;

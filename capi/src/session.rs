@@ -77,7 +77,8 @@ unsafe fn voice(session: *const VisavisSession, which: i32, body: impl FnOnce(&V
 /// Appends to a voice.
 ///
 /// # Safety
-/// As [`around`]; `samples`, if neither null nor misaligned, are `count`, which nobody writes to meanwhile.
+/// As [`around`]; `samples`, if neither null nor misaligned, are `count`, which nobody writes to
+/// meanwhile.
 unsafe fn push(
     session: *const VisavisSession,
     speaker: Speaker,
@@ -89,7 +90,8 @@ unsafe fn push(
     unsafe { around(session, |shared| Ok(shared.voice(speaker).push(slice(samples, count, "samples")?, rate)?)) }
 }
 
-/// Starts a session on `engine`; `options` may be NULL for the defaults. All its memory is taken here.
+/// Starts a session on `engine`; `options` may be NULL for the defaults. All its memory is taken
+/// here.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_new(
     engine: *const VisavisEngine,
@@ -121,10 +123,12 @@ pub unsafe extern "C" fn visavis_session_free(session: *mut VisavisSession) {
     });
 }
 
-/// Appends to the agent's own voice: `count` mono samples, full scale 1, of `rate` Hz (8000 to 192000), up to a minute ahead
-/// of time. More is dropped and counted. Sound that has not come when a block is computed is silence there, is counted, and
-/// is heard later. A voice that was never pushed is absent, which is not the same as silent. Samples that are not finite become
-/// silence, are counted, and make the status VISAVIS_STATUS_AUDIO; all others are taken. From any thread, see THREADS.
+/// Appends to the agent's own voice: `count` mono samples, full scale 1, of `rate` Hz (8000 to
+/// 192000), up to a minute ahead of time. More is dropped and counted. Sound that has not come when
+/// a block is computed is silence there, is counted, and is heard later. A voice that was never
+/// pushed is absent, which is not the same as silent. Samples that are not finite become silence,
+/// are counted, and make the status VISAVIS_STATUS_AUDIO; all others are taken. From any thread,
+/// see THREADS.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_push_agent_audio(
     session: *mut VisavisSession,
@@ -148,21 +152,24 @@ pub unsafe extern "C" fn visavis_session_push_user_audio(
     unsafe { push(session, Speaker::User, samples, count, rate) }
 }
 
-/// Ends an utterance of a voice (a visavis_voice): the last milliseconds, which wait in the resampler, come out. Optional.
+/// Ends an utterance of a voice (a visavis_voice): the last milliseconds, which wait in the
+/// resampler, come out. Optional.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_finish_audio(session: *mut VisavisSession, which: i32) -> VisavisStatus {
     // SAFETY: the header's promise.
     unsafe { voice(session, which, VoiceInput::finish) }
 }
 
-/// Drops all sound of a voice (a visavis_voice) that has not been used, as when an utterance is broken off.
+/// Drops all sound of a voice (a visavis_voice) that has not been used, as when an utterance is
+/// broken off.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_clear_audio(session: *mut VisavisSession, which: i32) -> VisavisStatus {
     // SAFETY: the header's promise.
     unsafe { voice(session, which, VoiceInput::clear) }
 }
 
-/// Makes a voice (a visavis_voice) present, silent until something is pushed (`present` not 0), or absent until the next push (0).
+/// Makes a voice (a visavis_voice) present, silent until something is pushed (`present` not 0), or
+/// absent until the next push (0).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_set_audio_present(
     session: *mut VisavisSession,
@@ -173,8 +180,9 @@ pub unsafe extern "C" fn visavis_session_set_audio_present(
     unsafe { voice(session, which, |voice| voice.set_present(present != 0)) }
 }
 
-/// Tells where the user's head is (midpoint of the eyes), world metres, at `time` seconds of session time. Any rate; positions are put
-/// in order by time. Those that are late, not finite or impossible are ignored and counted (visavis_stats). From any thread.
+/// Tells where the user's head is (midpoint of the eyes), world metres, at `time` seconds of
+/// session time. Any rate; positions are put in order by time. Those that are late, not finite or
+/// impossible are ignored and counted (visavis_stats). From any thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_push_user_head(
     session: *mut VisavisSession,
@@ -205,7 +213,8 @@ pub unsafe extern "C" fn visavis_session_set_natural_gaze(session: *mut VisavisS
     unsafe { around(session, |s| Ok(s.controls().set_gaze(None)?)) }
 }
 
-/// Sets the guidance weights, 0 to 20: of the conditioning as a whole (1 is none), and of the gaze target.
+/// Sets the guidance weights, 0 to 20: of the conditioning as a whole (1 is none), and of the gaze
+/// target.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_set_guidance(
     session: *mut VisavisSession,
@@ -227,16 +236,16 @@ pub unsafe extern "C" fn visavis_session_set_sampler(
     unsafe { around(session, |s| Ok(s.controls().set_sampler(sampler(kind, steps)?)?)) }
 }
 
-/// Sets the milliseconds that a block may take, 1 to 133.3, from the next block on: a governor then chooses the sampler of
-/// each block, the session's at best. 0 pins the session's sampler.
+/// Sets the milliseconds that a block may take, 1 to 133.3, from the next block on: a governor then
+/// chooses the sampler of each block, the session's at best. 0 pins the session's sampler.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_set_budget(session: *mut VisavisSession, milliseconds: f32) -> VisavisStatus {
     // SAFETY: the header's promise.
     unsafe { around(session, |s| Ok(s.controls().set_budget(milliseconds)?)) }
 }
 
-/// Tells the governor how long the last block took by the caller's clock, in place of what the session measured: for callers
-/// whose deadline covers more than visavis_session_poll.
+/// Tells the governor how long the last block took by the caller's clock, in place of what the
+/// session measured: for callers whose deadline covers more than visavis_session_poll.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_report_block_time(
     session: *mut VisavisSession,
@@ -246,12 +255,13 @@ pub unsafe extern "C" fn visavis_session_report_block_time(
     unsafe { around(session, |s| Ok(s.controls().report_block_time(milliseconds)?)) }
 }
 
-/// Computes the next block if it is due at `now` (session time, seconds, never running backwards). Call it until
-/// `*frame_count` is 0: a caller that comes late gets all blocks that it missed.
+/// Computes the next block if it is due at `now` (session time, seconds, never running backwards).
+/// Call it until `*frame_count` is 0: a caller that comes late gets all blocks that it missed.
 ///
-/// When a block is due, `*frame_count` becomes 4, and `frames[0..4]` and `joints` are filled; the joints of frame `i` start at
-/// `joints[i * visavis_engine_joint_count]`. `frame_size` is sizeof(visavis_frame); `joint_capacity`, in joints, must be
-/// at least 4 times the joint count. `joints` may be NULL with capacity 0 if only the frames are wanted. Nothing is allocated.
+/// When a block is due, `*frame_count` becomes 4, and `frames[0..4]` and `joints` are filled; the
+/// joints of frame `i` start at `joints[i * visavis_engine_joint_count]`. `frame_size` is
+/// sizeof(visavis_frame); `joint_capacity`, in joints, must be at least 4 times the joint count.
+/// `joints` may be NULL with capacity 0 if only the frames are wanted. Nothing is allocated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_poll(
     session: *mut VisavisSession,
@@ -300,22 +310,25 @@ pub unsafe extern "C" fn visavis_session_next_due(session: *const VisavisSession
     unsafe { with(session, due) }
 }
 
-/// Starts anew with the options of now; session time is 0 again. Same inputs, same bits. What was pushed before is dropped.
+/// Starts anew with the options of now; session time is 0 again. Same inputs, same bits. What was
+/// pushed before is dropped.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_reset(session: *mut VisavisSession) -> VisavisStatus {
     // SAFETY: the header's promise.
     unsafe { with(session, |s| Ok(s.reset()?)) }
 }
 
-/// Computes `blocks` blocks for nothing and starts anew, so that memory and CPU are warm when the first block is due.
+/// Computes `blocks` blocks for nothing and starts anew, so that memory and CPU are warm when the
+/// first block is due.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_warm_up(session: *mut VisavisSession, blocks: u32) -> VisavisStatus {
     // SAFETY: the header's promise.
     unsafe { with(session, |s| Ok(s.warm_up(blocks)?)) }
 }
 
-/// Kernel ids of the threads that the session owns and computes on, for performance hints: `*count` of them, the first `capacity` into
-/// `ids`. The thread that polls computes too (visavis_current_thread_id).
+/// Kernel ids of the threads that the session owns and computes on, for performance hints: `*count`
+/// of them, the first `capacity` into `ids`. The thread that polls computes too
+/// (visavis_current_thread_id).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_worker_thread_ids(
     session: *const VisavisSession,

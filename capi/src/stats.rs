@@ -35,7 +35,8 @@ pub struct VisavisStats {
     pub block_ms_p99: f64,
     /// Maximum.
     pub block_ms_max: f64,
-    /// From something that the user does to the start of the first block that can answer, at most, milliseconds.
+    /// From something that the user does to the start of the first block that can answer, at most,
+    /// milliseconds.
     pub user_delay_ms: f64,
     /// The same for the agent's own voice; 0 when it is known ahead.
     pub agent_delay_ms: f64,
@@ -77,7 +78,8 @@ pub struct VisavisStats {
     pub agent_non_finite_samples: u64,
     /// Pushed at a rate out of range and not taken.
     pub agent_bad_rate_samples: u64,
-    /// Dropped because another thread was inside this voice's input and lost its core there for long.
+    /// Dropped because another thread was inside this voice's input and lost its core there for
+    /// long.
     pub agent_contended_samples: u64,
     /// The same for the user's voice.
     pub user_non_finite_samples: u64,

@@ -22,7 +22,8 @@ pub enum VisavisStatus {
     BundleVersion = 4,
     /// The bundle's config and tensors disagree.
     BundleInvalid = 5,
-    /// Audio of a bad rate, of which nothing was taken, or samples that are not finite, in whose place there is silence.
+    /// Audio of a bad rate, of which nothing was taken, or samples that are not finite, in whose
+    /// place there is silence.
     Audio = 6,
     /// The call does not fit the session's state, for example time that runs backwards.
     State = 7,
@@ -78,7 +79,8 @@ thread_local! {
     static LAST: RefCell<Option<CString>> = const { RefCell::new(None) };
 }
 
-/// Text of the last error of the calling thread; empty after a call that succeeded. UTF-8, never NULL.
+/// Text of the last error of the calling thread; empty after a call that succeeded. UTF-8, never
+/// NULL.
 #[unsafe(no_mangle)]
 pub extern "C" fn visavis_last_error() -> *const c_char {
     // A thread that is ending has no text any more.

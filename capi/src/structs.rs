@@ -68,18 +68,21 @@ fn check_count<T>(count: usize, name: &str) -> Outcome {
     Ok(())
 }
 
-/// A struct of plain numbers, valid with any bits, whose first field says how large the caller believes it to be.
+/// A struct of plain numbers, valid with any bits, whose first field says how large the caller
+/// believes it to be.
 ///
 /// # Safety
 /// `#[repr(C)]`, every bit pattern valid, no padding, `struct_size: u32` first.
 pub(crate) unsafe trait Sized32: Copy {
-    /// Size of the struct as it was first published: a literal, so that it stays when the struct grows.
+    /// Size of the struct as it was first published: a literal, so that it stays when the struct
+    /// grows.
     const FIRST: usize;
     /// Its name in C.
     const NAME: &'static str;
 
-    /// Reads what the caller filled in over `defaults`: an older caller's shorter struct leaves the rest as it is. A newer caller's longer
-    /// one is taken if what this library does not know is zero.
+    /// Reads what the caller filled in over `defaults`: an older caller's shorter struct leaves the
+    /// rest as it is. A newer caller's longer one is taken if what this library does not know is
+    /// zero.
     ///
     /// # Safety
     /// A non-null `pointer` points to as many bytes as its first field says.
@@ -99,7 +102,8 @@ pub(crate) unsafe trait Sized32: Copy {
         Ok(value)
     }
 
-    /// Writes as much of `value` as the caller's struct holds, but for `struct_size`, which stays; bytes beyond are zeroed.
+    /// Writes as much of `value` as the caller's struct holds, but for `struct_size`, which stays;
+    /// bytes beyond are zeroed.
     ///
     /// # Safety
     /// As [`Sized32::read`], for writing.
@@ -133,7 +137,8 @@ pub(crate) unsafe trait Sized32: Copy {
     }
 }
 
-/// Makes sure that `struct_size` is where [`Sized32`] expects it, and that the struct has only grown since it was `$first` bytes.
+/// Makes sure that `struct_size` is where [`Sized32`] expects it, and that the struct has only
+/// grown since it was `$first` bytes.
 macro_rules! sized_struct {
     ($type:ident, $name:literal, $first:literal) => {
         const _: () = assert!(std::mem::offset_of!($type, struct_size) == 0 && size_of::<$type>() >= $first);

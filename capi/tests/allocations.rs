@@ -1,4 +1,5 @@
-//! After the first push of a voice, pushing and setting allocate nothing: proved with an allocator that counts, thread by thread.
+//! After the first push of a voice, pushing and setting allocate nothing: proved with an allocator
+//! that counts, thread by thread.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;

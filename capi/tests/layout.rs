@@ -48,7 +48,8 @@ fn structs_have_no_padding_and_csharp_has_the_same() {
     assert_eq!((align_of::<VisavisFrame>(), align_of::<VisavisJoint>()), (8, 4));
 }
 
-/// Every function of the header is in the C# file and the other way round, and every status has its number.
+/// Every function of the header is in the C# file and the other way round, and every status has its
+/// number.
 #[test]
 fn csharp_has_the_functions_and_numbers_of_the_header() {
     let root = env!("CARGO_MANIFEST_DIR");

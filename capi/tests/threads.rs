@@ -1,5 +1,5 @@
-//! Several threads in one session, by way of the C functions: two that push from one buffer and set what there is to set, and one that
-//! polls. Also under the sanitizers (`tests/sanitize.sh`).
+//! Several threads in one session, by way of the C functions: two that push from one buffer and set
+//! what there is to set, and one that polls. Also under the sanitizers (`tests/sanitize.sh`).
 
 use std::ptr::{null, null_mut};
 use visavis_c::*;
@@ -37,7 +37,8 @@ fn two_push_from_one_buffer_while_a_third_polls() {
             scope.spawn(move || {
                 let (Shared(session), Shared(buffer)) = (session, buffer);
                 for i in 0..300 {
-                    // SAFETY: alive until after the scope; the buffer has that length and nobody writes to it.
+                    // SAFETY: alive until after the scope; the buffer has that length and nobody
+                    // writes to it.
                     let all = unsafe {
                         [
                             visavis_session_push_agent_audio(session, buffer, 960, 48_000),

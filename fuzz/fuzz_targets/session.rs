@@ -1,5 +1,5 @@
-//! A caller that does anything in any order: sizes, rates, NaN, time that goes back, options that change. Frames are finite and
-//! in order, errors are typed, nothing else happens.
+//! A caller that does anything in any order: sizes, rates, NaN, time that goes back, options that
+//! change. Frames are finite and in order, errors are typed, nothing else happens.
 #![no_main]
 
 use arbitrary::{Arbitrary, Unstructured};
@@ -11,8 +11,9 @@ use visavis::{Budget, ErrorKind, Governor, Root, Sampler, Session, SessionOption
 use visavis_fuzz::{engine, student};
 
 thread_local! {
-    /// The session of most executions, of an engine with the student alone: making one takes longer than using it, and a reset is to
-    /// leave nothing behind. One execution in eight makes its own, with both networks.
+    /// The session of most executions, of an engine with the student alone: making one takes longer
+    /// than using it, and a reset is to leave nothing behind. One execution in eight makes its own,
+    /// with both networks.
     static KEPT: RefCell<Option<Session>> = const { RefCell::new(None) };
 }
 

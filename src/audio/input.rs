@@ -5,8 +5,9 @@
 //!    └──> inbox ─┘  while another thread has the feed
 //! ```
 //!
-//! The feed is one thread's at a time, by `try_lock`. A thread that does not get it leaves what it has in the inbox, and the thread that
-//! has the feed looks there before it starts and after it has let go: nobody waits, and what one thread pushes stays in order.
+//! The feed is one thread's at a time, by `try_lock`. A thread that does not get it leaves what it
+//! has in the inbox, and the thread that has the feed looks there before it starts and after it has
+//! let go: nobody waits, and what one thread pushes stays in order.
 
 use super::feed::{Command, Feed};
 use super::line::Line;
@@ -18,7 +19,8 @@ use std::sync::atomic::Ordering::{Relaxed, SeqCst};
 use std::sync::atomic::fence;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
-/// Samples beyond this are clipped: 18 dB over full scale, far from any voice and far from overflow.
+/// Samples beyond this are clipped: 18 dB over full scale, far from any voice and far from
+/// overflow.
 const CLIP: f32 = 8.0;
 /// Samples that are handled at once.
 const PIECE: usize = 256;
@@ -51,14 +53,17 @@ impl TryFrom<i32> for Speaker {
     }
 }
 
-/// A voice's input: pushes into a session from any thread, also while that session computes a block.
+/// A voice's input: pushes into a session from any thread, also while that session computes a
+/// block.
 ///
-/// Nothing here waits for a block or for another thread, and nothing but the first push of a voice, or of another rate, allocates
-/// ([`VoiceInput::prepare`] does so ahead). A block hears what was pushed before its poll began.
+/// Nothing here waits for a block or for another thread, and nothing but the first push of a voice,
+/// or of another rate, allocates ([`VoiceInput::prepare`] does so ahead). A block hears what was
+/// pushed before its poll began.
 ///
-/// A voice is one stream: sound stands in the order in which it was pushed, and how it was cut does not matter. So one thread pushes a
-/// voice's sound; commands may come from others. Should two threads push sound at the same moment, both are heard, one after the other,
-/// in pieces; what does not fit the 0.5 s that are kept meanwhile is dropped and counted.
+/// A voice is one stream: sound stands in the order in which it was pushed, and how it was cut does
+/// not matter. So one thread pushes a voice's sound; commands may come from others. Should two
+/// threads push sound at the same moment, both are heard, one after the other, in pieces; what does
+/// not fit the 0.5 s that are kept meanwhile is dropped and counted.
 #[derive(Clone)]
 pub struct VoiceInput {
     shared: Arc<Shared>,
@@ -81,18 +86,21 @@ impl VoiceInput {
         &self.shared.line
     }
 
-    /// Appends mono `samples` (full scale 1.0) of `rate` Hz (8000 to 192000) and makes the voice present. An empty push changes nothing.
+    /// Appends mono `samples` (full scale 1.0) of `rate` Hz (8000 to 192000) and makes the voice
+    /// present. An empty push changes nothing.
     ///
-    /// Up to a minute is kept ahead of the block that was computed last; what is more is dropped and counted. Samples that are not
-    /// finite are silence, those beyond 8 times full scale are clipped; both are counted.
+    /// Up to a minute is kept ahead of the block that was computed last; what is more is dropped
+    /// and counted. Samples that are not finite are silence, those beyond 8 times full scale are
+    /// clipped; both are counted.
     ///
-    /// On a change of rate the old resampler's last samples come first, as if silence followed, then the new stream
-    /// starts as if silence preceded it: a fade within 1.4 ms of the seam (4 ms at 8 kHz). Where the lag of resampling grows, its growth
-    /// is silence at the seam.
+    /// On a change of rate the old resampler's last samples come first, as if silence followed,
+    /// then the new stream starts as if silence preceded it: a fade within 1.4 ms of the seam (4 ms
+    /// at 8 kHz). Where the lag of resampling grows, its growth is silence at the seam.
     ///
     /// # Errors
-    /// [`ErrorKind::Audio`] for a rate out of range, of which nothing is taken, and for NaN or infinity among the samples, in whose place
-    /// there is silence: the rest of the push is taken. Both are counted.
+    /// [`ErrorKind::Audio`] for a rate out of range, of which nothing is taken, and for NaN or
+    /// infinity among the samples, in whose place there is silence: the rest of the push is taken.
+    /// Both are counted.
     pub fn push(&self, samples: &[f32], rate: u32) -> Result<()> {
         let Shared { line, inbox, .. } = &*self.shared;
         if let Err(e) = check_rate(rate) {
@@ -136,8 +144,9 @@ impl VoiceInput {
         Err(Error::new(ErrorKind::Audio, message))
     }
 
-    /// Makes what converts sound of `rate` Hz, so that the first push of that rate does not allocate either: for callbacks of audio
-    /// devices, ahead of time. Without effect while another thread pushes into this voice.
+    /// Makes what converts sound of `rate` Hz, so that the first push of that rate does not
+    /// allocate either: for callbacks of audio devices, ahead of time. Without effect while another
+    /// thread pushes into this voice.
     ///
     /// # Errors
     /// [`ErrorKind::Audio`] for a rate outside 8 to 192 kHz.
@@ -150,20 +159,20 @@ impl VoiceInput {
         Ok(())
     }
 
-    /// Ends an utterance: the last samples, which wait in the resampler for what follows, come out. Optional: they
-    /// come out with the next push otherwise.
+    /// Ends an utterance: the last samples, which wait in the resampler for what follows, come out.
+    /// Optional: they come out with the next push otherwise.
     pub fn finish(&self) {
         self.command(Command::Finish);
     }
 
-    /// Drops all sound that no block has used, as when an utterance is broken off; a block that is being computed may hear silence
-    /// already. The voice stays present.
+    /// Drops all sound that no block has used, as when an utterance is broken off; a block that is
+    /// being computed may hear silence already. The voice stays present.
     pub fn clear(&self) {
         self.command(Command::Clear);
     }
 
-    /// Makes the voice present (silent until something is pushed), or absent until the next push, dropping its sound. An absent voice is
-    /// not a silent one: the model was trained with both.
+    /// Makes the voice present (silent until something is pushed), or absent until the next push,
+    /// dropping its sound. An absent voice is not a silent one: the model was trained with both.
     pub fn set_present(&self, present: bool) {
         self.command(Command::Present(present));
     }
@@ -192,8 +201,8 @@ impl VoiceInput {
     /// Looks into the inbox when the feed has been let go, or was another thread's.
     fn sweep(&self) {
         loop {
-            // One of two threads sees the other: the one that left a record sees that the feed is free, or the one that let the feed
-            // go sees the record.
+            // One of two threads sees the other: the one that left a record sees that the feed is
+            // free, or the one that let the feed go sees the record.
             fence(SeqCst);
             if !self.shared.inbox.is_ready() || self.feed().is_none() {
                 return;

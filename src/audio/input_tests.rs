@@ -40,8 +40,9 @@ fn what_is_broken_off_is_room_at_once() {
     assert_eq!(block(&mut voice, 3).1, [0.5; 3_200]);
 }
 
-/// One thread pushes, one breaks off and mutes, one listens: what is heard is what one of them pushed, in its order, and nobody waits for
-/// another. A sample tells its number; silence is what was not pushed.
+/// One thread pushes, one breaks off and mutes, one listens: what is heard is what one of them
+/// pushed, in its order, and nobody waits for another. A sample tells its number; silence is what
+/// was not pushed.
 #[test]
 fn a_voice_in_three_threads() {
     const PUSHES: usize = 4_000;
@@ -78,7 +79,8 @@ fn a_voice_in_three_threads() {
             for (a, b) in sound.iter().zip(&sound[1..]) {
                 let step = (b - a) * 1_024.0;
                 let cut = *a == 0.0 || *b == 0.0;
-                // Sound that was broken off, dropped or muted leaves a step between pieces; within a piece numbers count on.
+                // Sound that was broken off, dropped or muted leaves a step between pieces; within
+                // a piece numbers count on.
                 assert!(cut || step == 1.0 || (b * 1_024.0 - 1.0) % 100.0 == 0.0, "{a} {b} in block {k}");
             }
             k += 1;

@@ -1,5 +1,5 @@
-//! Sound on its way from whoever pushes a voice to the block that hears it: a bounded line of 24 kHz samples with one writer and one
-//! reader at a time, neither of which waits for the other.
+//! Sound on its way from whoever pushes a voice to the block that hears it: a bounded line of 24
+//! kHz samples with one writer and one reader at a time, neither of which waits for the other.
 
 use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, fence};
@@ -17,15 +17,17 @@ pub struct VoiceStats {
     pub non_finite_samples: u64,
     /// Pushed at a rate out of range and not taken, input samples.
     pub bad_rate_samples: u64,
-    /// Dropped because another thread was inside this voice's input and lost its core there for long, input samples.
+    /// Dropped because another thread was inside this voice's input and lost its core there for
+    /// long, input samples.
     pub contended_samples: u64,
 }
 
-/// Samples `taken..written` of an endless stream, at most as many as the capacity. The writer may break the stream off: the reader goes
-/// on after [`Line::cleared`], and what was before is room at once.
+/// Samples `taken..written` of an endless stream, at most as many as the capacity. The writer may
+/// break the stream off: the reader goes on after [`Line::cleared`], and what was before is room at
+/// once.
 ///
-/// That room may be filled while the reader is still copying out of it. So a reader asks [`Line::is_cut`] after the copy and
-/// forgets what it copied if the line was cleared meanwhile.
+/// That room may be filled while the reader is still copying out of it. So a reader asks
+/// [`Line::is_cut`] after the copy and forgets what it copied if the line was cleared meanwhile.
 pub(super) struct Line {
     /// Bits of floats.
     samples: Box<[AtomicU32]>,
@@ -76,7 +78,8 @@ impl Line {
         [&self.samples[from..from + first], &self.samples[..count - first]]
     }
 
-    /// Appends what fits, and counts the rest. For the one writer, as all that follows up to [`Line::lag`].
+    /// Appends what fits, and counts the rest. For the one writer, as all that follows up to
+    /// [`Line::lag`].
     pub(super) fn push(&self, samples: &[f32]) {
         let written = self.written.load(Relaxed);
         // Acquire: the reader is done with what it says that it took.
@@ -101,7 +104,8 @@ impl Line {
     /// Drops what has not been taken.
     pub(super) fn clear(&self) {
         self.cleared.store(self.written.load(Relaxed), Release);
-        // Whoever reads a sample that is written after this sees that the line was cleared (with the fence in `is_cut`).
+        // Whoever reads a sample that is written after this sees that the line was cleared (with
+        // the fence in `is_cut`).
         fence(Release);
     }
 
@@ -118,20 +122,23 @@ impl Line {
         self.lag.load(Relaxed)
     }
 
-    /// What there is. In this order: a voice that is seen to be present has its first sound, and what was cleared was written.
+    /// What there is. In this order: a voice that is seen to be present has its first sound, and
+    /// what was cleared was written.
     pub(super) fn glimpse(&self) -> Glimpse {
         let present = self.present.load(Acquire);
         let cleared = self.cleared.load(Acquire);
         Glimpse { present, cleared, written: self.written.load(Acquire) }
     }
 
-    /// Copies the samples from `at` on, which were seen to be there. For the one reader, as all that follows.
+    /// Copies the samples from `at` on, which were seen to be there. For the one reader, as all
+    /// that follows.
     pub(super) fn read(&self, at: u64, out: &mut [f32]) {
         let places = self.pieces(at, out.len()).into_iter().flatten();
         out.iter_mut().zip(places).for_each(|(to, from)| *to = f32::from_bits(from.load(Relaxed)));
     }
 
-    /// Whether samples from `at` on, which were read before this, were cleared before or while they were read.
+    /// Whether samples from `at` on, which were read before this, were cleared before or while they
+    /// were read.
     pub(super) fn is_cut(&self, at: u64) -> bool {
         fence(Acquire);
         self.cleared.load(Relaxed) > at

@@ -1,8 +1,9 @@
 //! Voices: from pushed samples to one feature vector per frame.
 //!
 //! ```text
-//! push: f32 ──> VoiceInput (Resampler) ──> Voice, on the session's time line ──> AudioEncoder ──> D_a features per frame
-//!               any rate, size and thread  3200 samples per block out            on our kernels, or TractEncoder
+//! push: f32 ──> VoiceInput ───────────> Voice ─────────────────> AudioEncoder ──> features
+//! any size,     resampler; a ring of    3200 samples per block,  on our kernels,  D_a per
+//! rate, thread  a minute at 24 kHz      on the session's time    or TractEncoder  frame
 //! ```
 
 mod encoder;
@@ -31,7 +32,8 @@ pub enum AudioBackend {
     /// Our kernels, [`AudioEncoder`]: no allocation in a block, the same bits on every CPU.
     #[default]
     Kernels,
-    /// tract-core, [`TractEncoder`]: allocates in every block; equals the kernels within 1e-5 for float weights.
+    /// tract-core, [`TractEncoder`]: allocates in every block; equals the kernels within 1e-5 for
+    /// float weights.
     #[cfg(feature = "tract")]
     Tract,
 }

@@ -1,4 +1,5 @@
-//! One voice of the conversation: pushed in pieces of any size and rate, taken block by block at 24 kHz.
+//! One voice of the conversation: pushed in pieces of any size and rate, taken block by block at 24
+//! kHz.
 
 use super::input::VoiceInput;
 use super::line::{Glimpse, VoiceStats};
@@ -10,18 +11,21 @@ pub const VOICE_SECONDS: u32 = 60;
 
 /// A voice on the session's time line: sample `n` is heard `n / 24000` s after the session's start.
 ///
-/// Sound goes to the end of what is there. A block that is taken before all of its sound has come is filled up with
-/// silence, and what comes later follows after that silence: nothing that was pushed is lost, it is heard later.
-/// Sound of another rate than 24 kHz is heard [`Voice::lag_samples`] later, which covers the resampler's look-ahead: sound
-/// pushed up to a moment fills the line up to that moment, so neither the size of pushes nor how far ahead
-/// they come changes what is heard.
+/// Sound goes to the end of what is there. A block that is taken before all of its sound has come
+/// is filled up with silence, and what comes later follows after that silence: nothing that was
+/// pushed is lost, it is heard later. Sound of another rate than 24 kHz is heard
+/// [`Voice::lag_samples`] later, which covers the resampler's look-ahead: sound pushed up to a
+/// moment fills the line up to that moment, so neither the size of pushes nor how far ahead they
+/// come changes what is heard.
 ///
-/// This is the end that is heard, and one thread's; [`Voice::input`] is the end that is pushed into, any thread's.
+/// This is the end that is heard, and one thread's; [`Voice::input`] is the end that is pushed
+/// into, any thread's.
 pub struct Voice {
     input: VoiceInput,
     /// What [`Voice::look`] found.
     seen: Glimpse,
-    /// Sample of the session's time line that the next one of the stream becomes, and its number in the stream.
+    /// Sample of the session's time line that the next one of the stream becomes, and its number in
+    /// the stream.
     start: u64,
     at: u64,
     underrun: u64,
@@ -44,14 +48,16 @@ impl Voice {
         &self.input
     }
 
-    /// Takes notice of what was pushed: blocks that are taken from now on, until the next look, hear that and no more.
+    /// Takes notice of what was pushed: blocks that are taken from now on, until the next look,
+    /// hear that and no more.
     pub fn look(&mut self) {
         self.seen = self.input.line().glimpse();
         self.at = self.at.max(self.seen.cleared);
     }
 
-    /// Takes the sound of block `block` (samples `3200 block` up to `3200 (block + 1)`); returns whether the voice is
-    /// present. The samples of an absent voice are zero and not counted. Sound of blocks that were passed over is dropped.
+    /// Takes the sound of block `block` (samples `3200 block` up to `3200 (block + 1)`); returns
+    /// whether the voice is present. The samples of an absent voice are zero and not counted. Sound
+    /// of blocks that were passed over is dropped.
     ///
     /// # Errors
     /// [`ErrorKind::State`] when that block, or a later one, was taken before.
@@ -81,13 +87,14 @@ impl Voice {
         Ok(true)
     }
 
-    /// Whether there is a voice at all. An absent voice is not a silent one: the model was trained with both.
+    /// Whether there is a voice at all. An absent voice is not a silent one: the model was trained
+    /// with both.
     pub fn is_present(&self) -> bool {
         self.seen.present
     }
 
-    /// Samples (24 kHz) by which sound is heard later because it was resampled: 0 at 24 kHz, else the longest look-ahead
-    /// of the rates that were pushed.
+    /// Samples (24 kHz) by which sound is heard later because it was resampled: 0 at 24 kHz, else
+    /// the longest look-ahead of the rates that were pushed.
     pub fn lag_samples(&self) -> usize {
         self.input.line().lag()
     }

@@ -11,8 +11,8 @@ use std::sync::atomic::Ordering::Relaxed;
 
 /// Sets what a session goes by, from any thread, also while that session computes a block.
 ///
-/// Nothing here waits or allocates. What is set holds from the next block on, as with the session's own methods of these names; of each
-/// setting the last one counts.
+/// Nothing here waits or allocates. What is set holds from the next block on, as with the session's
+/// own methods of these names; of each setting the last one counts.
 #[derive(Debug, Clone)]
 pub struct Controls {
     engine: Arc<Engine>,
@@ -68,9 +68,9 @@ impl Setting {
 
 impl Controls {
     pub(super) fn new(engine: &Arc<Engine>, supports: impl Fn(Sampler) -> bool) -> Self {
-        let midpoint = [Sampler::Midpoint4, Sampler::Midpoint2, Sampler::Midpoint1];
+        let midpoint = [Sampler::Midpoint4, Sampler::Midpoint2, Sampler::Midpoint1, Sampler::Single];
         let euler = (1..=EulerSteps::MAX).filter_map(EulerSteps::new).map(Sampler::Euler);
-        let all = midpoint.into_iter().chain(euler).chain([Sampler::Single]);
+        let all = midpoint.into_iter().chain(euler);
         let pending = Pending {
             gaze: Setting::new(),
             guidance: Setting::new(),
@@ -113,8 +113,8 @@ impl Controls {
         Ok(())
     }
 
-    /// As [`Session::set_governor`] with [`Governor::within`]: milliseconds that a block may take, 1 to 133.3, or 0 for the session's
-    /// sampler, always.
+    /// As [`Session::set_governor`] with [`Governor::within`]: milliseconds that a block may take,
+    /// 1 to 133.3, or 0 for the session's sampler, always.
     ///
     /// # Errors
     /// As [`Session::set_governor`].

@@ -101,7 +101,8 @@ impl Ear {
         block.checked_sub(self.delay).filter(|known| *known >= self.first)
     }
 
-    /// Lets the sound that `block` may know go by unheard; the next that is heard starts a new signal.
+    /// Lets the sound that `block` may know go by unheard; the next that is heard starts a new
+    /// signal.
     fn skip(&mut self, block: u64) -> Result<()> {
         self.open = false;
         self.known(block).map_or(Ok(()), |known| self.voice.take_block(known, &mut self.samples).map(drop))
@@ -132,7 +133,8 @@ impl Ear {
 /// A voice and the block that it listens for.
 pub(super) type Listening<'a> = Option<(u64, &'a mut Ear)>;
 
-/// Lets all of `ears`, of any sessions, listen: side by side where more than one has something to hear.
+/// Lets all of `ears`, of any sessions, listen: side by side where more than one has something to
+/// hear.
 pub(super) fn listen(exec: &mut Exec, engine: &Engine, ears: &mut [Listening<'_>]) {
     let hears = |(block, ear): &&(u64, &mut Ear)| ear.voice.is_present() && ear.known(*block).is_some();
     let several = ears.iter().flatten().filter(hears).count() > 1;
@@ -176,7 +178,8 @@ impl Inputs {
         self.user.skip(block)
     }
 
-    /// Takes notice of what was pushed since the last time: the coming blocks know that and no more.
+    /// Takes notice of what was pushed since the last time: the coming blocks know that and no
+    /// more.
     pub(super) fn look(&mut self) {
         self.agent.voice.look();
         self.user.voice.look();
@@ -194,7 +197,8 @@ impl Inputs {
         &self.head
     }
 
-    /// World position of the user's head in frame `frame`, as far as it is known at the start of its block.
+    /// World position of the user's head in frame `frame`, as far as it is known at the start of
+    /// its block.
     pub(super) fn head_at(&mut self, frame: u64) -> Option<Vec3> {
         let start = (frame - frame % BLOCK_FRAMES as u64) as f64 / f64::from(FPS);
         known(self.track.sample(frame as f64 / f64::from(FPS), start))
@@ -205,8 +209,8 @@ impl Inputs {
         [Some((block, &mut self.agent)), Some((block, &mut self.user))]
     }
 
-    /// Makes the conditioning of `block`, for which voices have listened, with the agent's root at the end of the block
-    /// before.
+    /// Makes the conditioning of `block`, for which voices have listened, with the agent's root at
+    /// the end of the block before.
     pub(super) fn prepare(
         &mut self,
         block: u64,
@@ -233,8 +237,9 @@ impl Inputs {
         Ok(())
     }
 
-    /// Floor positions `(x, z)` of the user over the four frames that `block` may know, in the agent's frame; `None` when
-    /// the last of them is not known. Unknown earlier ones take the position that follows them.
+    /// Floor positions `(x, z)` of the user over the four frames that `block` may know, in the
+    /// agent's frame; `None` when the last of them is not known. Unknown earlier ones take the
+    /// position that follows them.
     fn user_in_agent_frame(&mut self, block: u64, root: &Root) -> Option<[f32; 8]> {
         let seen = block.checked_sub(self.user_delay).filter(|seen| *seen >= self.user.first)?;
         let now = (block * BLOCK_FRAMES as u64) as f64 / f64::from(FPS);

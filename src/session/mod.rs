@@ -26,11 +26,13 @@
 //! | `forcing` | what the quantiser's teacher does to a session |
 //! | `probe` | every stage of a block, for whoever wants to check the maths |
 //!
-//! Inputs and settings may come from any thread while a block is computed ([`VoiceInput`], [`HeadInput`], [`Controls`]): nobody
-//! waits for the block, and a block goes by what was there when its poll began.
+//! Inputs and settings may come from any thread while a block is computed ([`VoiceInput`],
+//! [`HeadInput`], [`Controls`]): nobody waits for the block, and a block goes by what was there
+//! when its poll began.
 //!
-//! After [`Session::poll`] has been called once, computing a block allocates nothing, takes no lock and makes no system
-//! call. The exceptions are outside the block: the first push of a voice, or a change of its rate, makes a resampler.
+//! After [`Session::poll`] has been called once, computing a block allocates nothing, takes no lock
+//! and makes no system call. The exceptions are outside the block: the first push of a voice, or a
+//! change of its rate, makes a resampler.
 
 mod anchor;
 mod block;
@@ -86,10 +88,12 @@ impl Engine {
         Session::new(Arc::clone(self), options)
     }
 
-    /// What it takes to step several sessions of this engine together, on `threads` threads (1 or 2): [`Team`] tells how.
+    /// What it takes to step several sessions of this engine together, on `threads` threads (1 or
+    /// 2): [`Team`] tells how.
     ///
     /// # Errors
-    /// [`ErrorKind::Argument`] for another number of threads; [`ErrorKind::Io`] when the second one cannot be started.
+    /// [`ErrorKind::Argument`] for another number of threads; [`ErrorKind::Io`] when the second one
+    /// cannot be started.
     pub fn team(self: &Arc<Self>, threads: usize) -> Result<Team> {
         Team::new(Arc::clone(self), threads)
     }
@@ -97,8 +101,9 @@ impl Engine {
 
 /// All mutable state of one conversation.
 ///
-/// Time is the caller's: seconds since the session started, the same clock for [`Session::push_user_head`] and
-/// [`Session::poll`]. Audio has no timestamps: each voice is one continuous stream that starts at time 0.
+/// Time is the caller's: seconds since the session started, the same clock for
+/// [`Session::push_user_head`] and [`Session::poll`]. Audio has no timestamps: each voice is one
+/// continuous stream that starts at time 0.
 pub struct Session {
     engine: Arc<Engine>,
     options: SessionOptions,
@@ -110,7 +115,8 @@ pub struct Session {
     times: stats::BlockTimes,
     policy: Option<Policy>,
     log: Log,
-    /// The last block, until the next decision: its plan, its work, and the milliseconds that it took.
+    /// The last block, until the next decision: its plan, its work, and the milliseconds that it
+    /// took.
     last: Option<(Plan, f64, f64)>,
     /// In the hands of a team: the block that is due, and the one that is computed.
     due: Option<team::Due>,
@@ -128,14 +134,13 @@ impl Session {
     /// A session on the threads of `exec`; its options have been checked.
     fn on(mut exec: Exec, engine: Arc<Engine>, options: SessionOptions) -> Result<Self> {
         let state = BlockState::new(&mut exec, &engine, &options)?;
-        let controls = Controls::new(&engine, |sampler| state.supports(sampler));
         let mut session = Self {
             work: Workspace::new(&engine, 1),
+            controls: Controls::new(&engine, |sampler| state.supports(sampler)),
             engine,
             options,
             exec,
             state,
-            controls,
             now: 0.0,
             times: stats::BlockTimes::new(),
             policy: None,
@@ -148,12 +153,12 @@ impl Session {
         Ok(session)
     }
 
-    /// Appends to a voice: mono samples, full scale 1, any rate from 8 to 192 kHz. The same as [`VoiceInput::push`] of
-    /// [`Session::voice_input`].
+    /// Appends to a voice: mono samples, full scale 1, any rate from 8 to 192 kHz. The same as
+    /// [`VoiceInput::push`] of [`Session::voice_input`].
     ///
-    /// The voice may come ahead of time (text-to-speech does) by up to a minute. Sound that has not come when a block is
-    /// computed is silence there, is counted, and is heard later. A voice that has never been pushed is absent,
-    /// which is not the same as silent.
+    /// The voice may come ahead of time (text-to-speech does) by up to a minute. Sound that has not
+    /// come when a block is computed is silence there, is counted, and is heard later. A voice that
+    /// has never been pushed is absent, which is not the same as silent.
     ///
     /// # Errors
     /// As [`VoiceInput::push`]: [`ErrorKind::Audio`] for a bad rate or samples that are not finite.
@@ -177,8 +182,8 @@ impl Session {
         self.push_audio(Speaker::User, samples, rate)
     }
 
-    /// Tells where the user's head is (midpoint of the eyes), world metres, at `time` seconds of session time. The same as
-    /// [`HeadInput::push`] of [`Session::head_input`].
+    /// Tells where the user's head is (midpoint of the eyes), world metres, at `time` seconds of
+    /// session time. The same as [`HeadInput::push`] of [`Session::head_input`].
     ///
     /// Any rate; positions that are not finite, late, or impossible are ignored and counted (see
     /// [`Session::stats`]).
@@ -191,7 +196,8 @@ impl Session {
         Ok(())
     }
 
-    /// A voice's input, for the thread that has its sound: to push, to end an utterance, to break one off, to set the voice's presence.
+    /// A voice's input, for the thread that has its sound: to push, to end an utterance, to break
+    /// one off, to set the voice's presence.
     pub fn voice_input(&self, speaker: Speaker) -> VoiceInput {
         self.state.inputs.voice(speaker).clone()
     }
@@ -211,8 +217,9 @@ impl Session {
         (self.state.block > self.options.diagnostics.first_block).then_some(&self.state.frames)
     }
 
-    /// The kernel's ids of the threads that this session owns and computes on, for performance hints: the second
-    /// thread's where there is one. The thread that calls [`Session::poll`] computes too ([`crate::threads::current_thread_id`]).
+    /// The kernel's ids of the threads that this session owns and computes on, for performance
+    /// hints: the second thread's where there is one. The thread that calls [`Session::poll`]
+    /// computes too ([`crate::threads::current_thread_id`]).
     pub fn worker_thread_ids(&self) -> impl Iterator<Item = u32> {
         self.exec.pool().helper_id().into_iter()
     }

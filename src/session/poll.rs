@@ -87,11 +87,12 @@ impl Session {
     }
 
     /// Starts anew, as if just made with the current options: same seed, same bits. Time starts at
-    /// 0 again.
+    /// 0 again. What was pushed before is dropped.
     ///
     /// # Errors
     /// None that the session's creation would not have met.
     pub fn reset(&mut self) -> Result<()> {
+        self.take_notice();
         self.forget();
         let mut tools = Tools { exec: &mut self.exec, work: &mut self.work, engine: &self.engine };
         self.state.reset(&mut tools, &self.options, self.engine.idle.view());

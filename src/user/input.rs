@@ -13,11 +13,13 @@ const WORDS: usize = 3;
 /// Attempts to make room before a sample is given up: more than that many other threads are at it.
 const ATTEMPTS: usize = 8;
 
-/// The input of the user's head: tells where it is from any thread, also while the session computes a block.
+/// The input of the user's head: tells where it is from any thread, also while the session computes
+/// a block.
 ///
-/// Nothing here waits or allocates. A block knows what was pushed before its poll began. Samples are put in order by their time stamps,
-/// whichever thread they come from: the same samples give the same bits. Up to 8192 (68 s at 120 Hz) wait for the next poll; beyond
-/// that the oldest are dropped and counted ([`super::TrackStats::overwritten`]).
+/// Nothing here waits or allocates. A block knows what was pushed before its poll began. Samples
+/// are put in order by their time stamps, whichever thread they come from: the same samples give
+/// the same bits. Up to 8192 (68 s at 120 Hz) wait for the next poll; beyond that the oldest are
+/// dropped and counted ([`super::TrackStats::overwritten`]).
 #[derive(Clone)]
 pub struct HeadInput {
     shared: Arc<Shared>,
@@ -36,10 +38,12 @@ impl HeadInput {
         Self { shared: Arc::new(Shared { samples: Queue::new(CAPACITY), non_finite, absurd, dropped }) }
     }
 
-    /// Tells where the head is (midpoint of the eyes), world metres, at `time` seconds of session time.
+    /// Tells where the head is (midpoint of the eyes), world metres, at `time` seconds of session
+    /// time.
     ///
-    /// Any rate and any order: a sample is in time as long as no block has used one that is not earlier, and so as long as no poll came in
-    /// between. Samples that are late, not finite, or impossible are ignored and counted ([`super::TrackStats`]).
+    /// Any rate and any order: a sample is in time as long as no block has used one that is not
+    /// earlier, and so as long as no poll came in between. Samples that are late, not finite, or
+    /// impossible are ignored and counted ([`super::TrackStats`]).
     pub fn push(&self, position: Vec3, time: f64) {
         let Shared { samples, non_finite, absurd, dropped } = &*self.shared;
         let count = |counter: &AtomicU64| _ = counter.fetch_add(1, Relaxed);
@@ -62,7 +66,8 @@ impl HeadInput {
         count(dropped);
     }
 
-    /// Moves what was pushed into `track`; returns at the latest after as many samples as wait at once.
+    /// Moves what was pushed into `track`; returns at the latest after as many samples as wait at
+    /// once.
     pub(crate) fn drain(&self, track: &mut HeadTrack) {
         let mut sample = [0; WORDS];
         for _ in 0..CAPACITY {
@@ -75,7 +80,8 @@ impl HeadInput {
         }
     }
 
-    /// Counters of a track, and of what did not get there. What waits for the next poll is in none of them.
+    /// Counters of a track, and of what did not get there. What waits for the next poll is in none
+    /// of them.
     pub(crate) fn stats(&self, track: &HeadTrack) -> TrackStats {
         let (mut stats, Shared { non_finite, absurd, dropped, .. }) = (track.stats(), &*self.shared);
         stats.non_finite += non_finite.load(Relaxed);
@@ -132,17 +138,5 @@ mod tests {
         input.drain(&mut t);
         assert_eq!(input.stats(&t), TrackStats { accepted: 8_192, ..Default::default() });
         assert_eq!([28.07, 109.99].map(|time| t.sample(time, 200.0).presence), [Presence::Absent, Presence::Measured]);
-    }
-
-    #[test]
-    fn a_block_is_four_frames() {
-        let samples: Vec<_> = (0..90).map(|i| (i as f32 / 90.0, f64::from(i) / 90.0)).collect();
-        let mut t = track(&samples);
-        let mut out = [ABSENT; 4];
-        t.block(10, 0.5, &mut out);
-        for (i, sample) in out.iter().enumerate() {
-            assert_eq!(sample.presence, Presence::Measured);
-            assert!((sample.position.x - (10 + i) as f32 / 30.0).abs() < 1e-6);
-        }
     }
 }

@@ -7,7 +7,8 @@ use std::collections::VecDeque;
 
 /// Samples that a [`HeadTrack::new`] keeps: 68 s at 120 Hz.
 pub(super) const CAPACITY: usize = 8_192;
-/// Shortest time that speeds are judged over, s: what a tracker's jitter makes of two close time stamps is no teleport.
+/// Shortest time that speeds are judged over, s: what a tracker's jitter makes of two close time
+/// stamps is no teleport.
 const SPEED_TIME: f64 = 1.0 / 120.0;
 /// Times further from 0 than this are not believed, s (about 115 days).
 const MAX_TIME: f64 = 1e7;
@@ -40,11 +41,13 @@ pub struct TrackStats {
     pub accepted: u64,
     /// Ignored: NaN or infinity in the position or the time.
     pub non_finite: u64,
-    /// Ignored: late (a block has used a sample of that time or of a later one), or at the time of another sample.
+    /// Ignored: late (a block has used a sample of that time or of a later one), or at the time of
+    /// another sample.
     pub out_of_order: u64,
     /// Ignored: more than 1 km from the origin, or a time of more than 10 million seconds.
     pub absurd: u64,
-    /// Taken, but too far from the sample before to have walked there; the way between is not filled in.
+    /// Taken, but too far from the sample before to have walked there; the way between is not
+    /// filled in.
     pub teleports: u64,
     /// Dropped to make room before they were asked for.
     pub overwritten: u64,
@@ -75,9 +78,9 @@ pub(super) fn fault(position: Vec3, time: f64) -> Option<Fault> {
 
 /// Timed head positions. Bounded; allocates when made and never after.
 ///
-/// Causal: the answer for a frame depends on samples with `time <= now` only, so pushing a whole recording ahead of time
-/// gives what live tracking gives. Samples may come in any order as long as none was used that is not earlier: what stands is
-/// sorted by time.
+/// Causal: the answer for a frame depends on samples with `time <= now` only, so pushing a whole
+/// recording ahead of time gives what live tracking gives. Samples may come in any order as long as
+/// none was used that is not earlier: what stands is sorted by time.
 #[derive(Debug)]
 pub struct HeadTrack {
     /// In order of time.
@@ -108,8 +111,9 @@ impl HeadTrack {
         }
     }
 
-    /// Adds a head position (world, metres, within 1 km) at `time` (session time, seconds), which is later than all samples that
-    /// were used and is no other sample's. What does not fit that is ignored and counted, see [`TrackStats`].
+    /// Adds a head position (world, metres, within 1 km) at `time` (session time, seconds), which
+    /// is later than all samples that were used and is no other sample's. What does not fit that is
+    /// ignored and counted, see [`TrackStats`].
     pub fn push(&mut self, position: Vec3, time: f64) {
         match fault(position, time) {
             Some(Fault::NonFinite) => return self.stats.non_finite += 1,
@@ -154,8 +158,9 @@ impl HeadTrack {
         self.samples[at].jump = jump;
     }
 
-    /// The head at `time` (session seconds), as known at `now`: linear between neighbours, both no later than `now`,
-    /// unless they are more than half a second or a teleport apart; else the last one before, for half a second.
+    /// The head at `time` (session seconds), as known at `now`: linear between neighbours, both no
+    /// later than `now`, unless they are more than half a second or a teleport apart; else the last
+    /// one before, for half a second.
     pub fn sample(&mut self, time: f64, now: f64) -> UserSample {
         if now > self.asked {
             self.asked = now;
@@ -195,7 +200,8 @@ impl HeadTrack {
         self.samples.partition_point(|s| keep(s.time))
     }
 
-    /// The head in the four frames from `first_frame` on (frame `i` at `i / 30` s), as known at `now` seconds.
+    /// The head in the four frames from `first_frame` on (frame `i` at `i / 30` s), as known at
+    /// `now` seconds.
     pub fn block(&mut self, first_frame: u64, now: f64, out: &mut [UserSample; BLOCK_FRAMES]) {
         for (i, sample) in out.iter_mut().enumerate() {
             *sample = self.sample((first_frame + i as u64) as f64 / f64::from(FPS), now);

@@ -119,6 +119,18 @@ fn a_full_track_keeps_the_newest() {
     assert_eq!(t.sample(0.25, 1.0), measured(0.25));
 }
 
+#[test]
+fn a_block_is_four_frames() {
+    let samples: Vec<_> = (0..90).map(|i| (i as f32 / 90.0, f64::from(i) / 90.0)).collect();
+    let mut t = track(&samples);
+    let mut out = [ABSENT; 4];
+    t.block(10, 0.5, &mut out);
+    for (i, sample) in out.iter().enumerate() {
+        assert_eq!(sample.presence, Presence::Measured);
+        assert!((sample.position.x - (10 + i) as f32 / 30.0).abs() < 1e-6);
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(256))]
 

@@ -1,5 +1,6 @@
-//! Direct buffers: memory that Java, or another call, may write to at any moment. So it is never a Rust slice of numbers: it is read
-//! and written element by element, each in one relaxed atomic access, which is what the JVM's own accesses are.
+//! Direct buffers: memory that Java, or another call, may write to at any moment. So it is never a
+//! Rust slice of numbers: it is read and written element by element, each in one relaxed atomic
+//! access, which is what the JVM's own accesses are.
 
 use crate::error::{Failure, Outcome};
 use jni::Env;
@@ -18,7 +19,8 @@ impl Element for AtomicU32 {}
 /// Elements of a direct buffer from `position` on, `count` of them.
 ///
 /// # Safety
-/// `buffer`, if not null, is a `java.nio.Buffer` with elements of the size of `T`, in native byte order (Java checks that).
+/// `buffer`, if not null, is a `java.nio.Buffer` with elements of the size of `T`, in native byte
+/// order (Java checks that).
 pub(crate) unsafe fn elements<'a, T: Element>(
     env: &Env<'_>,
     buffer: &'a JObject<'_>,
@@ -28,7 +30,8 @@ pub(crate) unsafe fn elements<'a, T: Element>(
     if buffer.is_null() {
         return Err(jni::errors::Error::NullPtr("buffer is null").into());
     }
-    // SAFETY: only passed to the two functions below, which take any java.nio.Buffer; not an owning reference.
+    // SAFETY: only passed to the two functions below, which take any java.nio.Buffer; not an owning
+    // reference.
     let view = unsafe { JByteBuffer::from_raw(env, buffer.as_raw()) };
     let not_direct = |_| Failure::Argument("the buffer is not direct: use ByteBuffer.allocateDirect".to_owned());
     let address = env.get_direct_buffer_address(&view).map_err(not_direct)?;
@@ -44,10 +47,11 @@ pub(crate) unsafe fn elements<'a, T: Element>(
     if !start.is_aligned() {
         return Err(Failure::Argument(format!("the buffer is not aligned to {} bytes", align_of::<T>())));
     }
-    // SAFETY: inside the buffer and aligned, any bits are valid, alive as long as the local reference that `buffer` borrows. The slice is
-    // of atomics: others may read and write the same memory, as Rust does, by atomic accesses, and as the JVM does, by plain machine
-    // accesses to whole elements, which do not tear. Loads are all that is done to a buffer that Java calls read-only, and relaxed loads
-    // of this size may be made of memory that cannot be written to.
+    // SAFETY: inside the buffer and aligned, any bits are valid, alive as long as the local
+    // reference that `buffer` borrows. The slice is of atomics: others may read and write the same
+    // memory, as Rust does, by atomic accesses, and as the JVM does, by plain machine accesses to
+    // whole elements, which do not tear. Loads are all that is done to a buffer that Java calls
+    // read-only, and relaxed loads of this size may be made of memory that cannot be written to.
     Ok(unsafe { std::slice::from_raw_parts(start.add(from), count) })
 }
 
@@ -92,8 +96,9 @@ mod tests {
     use std::path::Path;
     use visavis::{Engine, SessionOptions, SharedSession, Speaker};
 
-    /// What Java may do with one buffer: two threads push from it into one session, and one of them into both voices, a third changes what
-    /// is in it, a fourth polls into it. Under the sanitizers (`tests/sanitize.sh`) as well.
+    /// What Java may do with one buffer: two threads push from it into one session, and one of them
+    /// into both voices, a third changes what is in it, a fourth polls into it. Under the
+    /// sanitizers (`tests/sanitize.sh`) as well.
     #[test]
     fn one_buffer_for_all() {
         let bundle = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/goldens/tiny.safetensors");

@@ -40,7 +40,8 @@ fn engine_from_fd<'l>(_: &mut Env<'l>, _: JClass<'l>, fd: jint, offset: jlong, l
     if fd < 0 {
         return Err(argument("the file descriptor"));
     }
-    // SAFETY: not -1, and open for the time of this call: Java holds the ParcelFileDescriptor. Duplicating a closed one fails.
+    // SAFETY: not -1, and open for the time of this call: Java holds the ParcelFileDescriptor.
+    // Duplicating a closed one fails.
     let fd = unsafe { std::os::fd::BorrowedFd::borrow_raw(fd) };
     Ok(ENGINES.insert(Engine::from_fd(fd, offset, length)?))
 }

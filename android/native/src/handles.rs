@@ -6,7 +6,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
 
-/// Objects by number. Numbers are never used twice, so a closed object's number finds nothing, for ever.
+/// Objects by number. Numbers are never used twice, so a closed object's number finds nothing, for
+/// ever.
 ///
 /// Looking one up takes no lock: opening and closing replace the whole table.
 pub(crate) struct Table<T> {
@@ -37,13 +38,15 @@ impl<T> Table<T> {
         number
     }
 
-    /// The object of a number; it lives at least as long as what is returned, whoever closes it meanwhile.
+    /// The object of a number; it lives at least as long as what is returned, whoever closes it
+    /// meanwhile.
     pub(crate) fn get(&self, number: i64) -> Outcome<Arc<T>> {
         let found = self.by_number.load().as_ref().and_then(|table| table.get(&number).cloned());
         found.ok_or_else(|| Failure::State(format!("this {} is closed", self.what)))
     }
 
-    /// Forgets an object; false if there is none of that number. It is dropped here, unless it is in use.
+    /// Forgets an object; false if there is none of that number. It is dropped here, unless it is
+    /// in use.
     pub(crate) fn remove(&self, number: i64) -> bool {
         self.replace(|table| _ = table.remove(&number)).is_some_and(|before| before.contains_key(&number))
     }

@@ -16,7 +16,8 @@ use visavis::{BLOCK_FRAMES, Frame, Governor, Root, Session, SessionOptions, Shar
 
 pub(crate) static SESSIONS: Table<SharedSession> = Table::new("session");
 
-/// Floats of a frame before its joints: root x, z, yaw; hips x, y, z; gaze score (NaN: not known); fit error; held; evaluations.
+/// Floats of a frame before its joints: root x, z, yaw; hips x, y, z; gaze score (NaN: not known);
+/// fit error; held; evaluations.
 const HEAD: usize = 10;
 /// Floats of a joint: local rotation 4, world position 3, world rotation 4.
 const JOINT: usize = 11;
@@ -46,7 +47,8 @@ native!("Java_org_visavis_Native_reset": reset(session: jlong));
 native!("Java_org_visavis_Native_warmUp": warm_up(session: jlong, blocks: jint));
 native!("Java_org_visavis_Native_workerThreadIds": worker_thread_ids(session: jlong) -> jint[]);
 
-/// Runs `body` on what goes around a session: inputs and controls, whoever is inside it. Waits for nobody.
+/// Runs `body` on what goes around a session: inputs and controls, whoever is inside it. Waits for
+/// nobody.
 pub(crate) fn around<T>(session: jlong, body: impl FnOnce(&SharedSession) -> Outcome<T>) -> Outcome<T> {
     let shared = SESSIONS.get(session)?;
     if shared.is_poisoned() {
@@ -256,7 +258,8 @@ fn poll_buffer<'l>(
 ) -> Outcome<jint> {
     with(session, |s| {
         let needed = room(s, usize::try_from(count).unwrap_or(0))?;
-        // SAFETY: a FloatBuffer that is not read-only; Java has checked that, and the order of its bytes.
+        // SAFETY: a FloatBuffer that is not read-only; Java has checked that, and the order of its
+        // bytes.
         let out: &[AtomicU32] = unsafe { elements(env, &out, position, needed as jint) }?;
         let Some(frames) = s.poll(now)? else { return Ok(0) };
         write(frames, |at, value| out[at].store(value.to_bits(), Relaxed));

@@ -1,8 +1,9 @@
-//! Makes `capi/include/visavis.h` from the code of the C interface: `cargo run -p visavis-header`. Its test tells when that is due.
-//! With the name of a file it writes there the header of the next version, which is that of the library with the feature `grown`.
+//! Makes `capi/include/visavis.h` from the code of the C interface: `cargo run -p visavis-header`.
+//! Its test tells when that is due. With the name of a file it writes there the header of the next
+//! version, which is that of the library with the feature `grown`.
 //!
-//! The generator's version is pinned in Cargo.toml, so the text depends on the code alone. A crate of its own: what the generator
-//! depends on stays out of the library's build.
+//! The generator's version is pinned in Cargo.toml, so the text depends on the code alone. A crate
+//! of its own: what the generator depends on stays out of the library's build.
 
 use std::path::{Path, PathBuf};
 

@@ -42,12 +42,7 @@ pub(super) fn run(sums: Sums<'_>, bias: &[f32], finish: Finish<'_>, y: &mut [f32
 
 /// Sums as floats times the scale of their column.
 #[inline(always)]
-fn scale<T: Copy>(
-    sums: RowSums<'_, T>,
-    t: &mut [f32],
-    to_f32: impl Fn(T) -> f32,
-    scales: impl Iterator<Item = f32>,
-) {
+fn scale<T: Copy>(sums: RowSums<'_, T>, t: &mut [f32], to_f32: impl Fn(T) -> f32, scales: impl Iterator<Item = f32>) {
     let n = t.len();
     match sums {
         RowSums::Whole(sums) => {

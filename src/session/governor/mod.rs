@@ -56,7 +56,8 @@ pub enum Governor {
 }
 
 impl Governor {
-    /// A governor with a budget of `milliseconds` a block, or none for 0: what languages without this type pass.
+    /// A governor with a budget of `milliseconds` a block, or none for 0: what languages without
+    /// this type pass.
     pub fn within(milliseconds: f32) -> Self {
         if milliseconds == 0.0 {
             return Self::Off;
