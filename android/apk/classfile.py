@@ -3,7 +3,7 @@ import pathlib
 import struct
 import zipfile
 
-FLAGS = {0x1: "public", 0x2: "private", 0x4: "protected", 0x8: "static", 0x10: "final", 0x400: "abstract", 0x1000: "synthetic"}
+FLAGS = {0x1: "public", 0x2: "private", 0x4: "protected", 0x8: "static", 0x10: "final", 0x100: "native", 0x400: "abstract", 0x1000: "synthetic"}
 
 
 def flags(bits):
