@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # What a shrinker leaves with the library's consumer rules: android/apk/keeprules.sh MANIFEST.pro STANDINS CLASSES...
-# ProGuard stands for R8, which reads the same rules. Native methods and what the native library constructs must keep their names, and something
-# else must have lost its own, or nothing was tried.
+# ProGuard stands for R8, which reads the same rules. Native methods that are used, and what the native library constructs, must keep their names;
+# something else must have lost its own, or nothing was tried.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 manifest=$1 standins=$2
@@ -28,12 +28,12 @@ PYTHONPATH=android/apk python3 - "$work/out.jar" "$@" <<'PY'
 import sys
 from classfile import read
 kept, before = read(sys.argv[1:2]), read(sys.argv[2:])
-natives = {(c.name, m[1], m[2]) for c in before.values() for m in c.methods if "native" in m[0]}
-left = {(c.name, m[1], m[2]) for c in kept.values() for m in c.methods}
+members = lambda classes, word: {(c.name, m[1], m[2]) for c in classes.values() for m in c.methods if word in m[0]}
+natives, left = members(before, "native"), members(kept, "native")
 made = [n for n in before if n == "org/visavis/VisavisException" or n.startswith("org/visavis/BundleException") or n == "org/visavis/MicrophoneException"]
-lost = sorted(f"{c}.{n}{d}" for c, n, d in (natives | {(n, "<init>", "(Ljava/lang/String;)V") for n in made}) - left)
+lost = left - natives | {(n, "<init>", "(Ljava/lang/String;)V") for n in made} - members(kept, "public")
 renamed = len(set(kept) - set(before))
-print(f"{len(before)} classes, {len(kept)} left, {renamed} renamed; {len(natives)} native methods and {len(made)} exceptions kept")
-if lost or not natives or len(made) < 5 or not renamed:
-    sys.exit(f"lost: {lost}")
+print(f"{len(before)} classes, {len(kept)} left, {renamed} renamed; names kept: {len(left)} native methods that are used, {len(made)} exceptions")
+if lost or not left or len(made) < 5 or not renamed:
+    sys.exit(f"lost: {sorted(lost)}")
 PY

@@ -13,7 +13,7 @@ import java.util.Arrays;
 
 /**
  * Tests of the demo app on a JVM: every static method whose name starts with "test" of the classes below, in order. Arguments: the tiny bundle; further
- * ones are ignored. Runs in the repository's root.
+ * ones are ignored. With -Dvisavis.only=PART only classes with that part in their name. Runs in the repository's root.
  */
 public final class DemoCheck {
     static File bundle;
@@ -32,6 +32,9 @@ public final class DemoCheck {
         int count = 0;
         try {
             for (Class<?> tests : new Class<?>[] {ProjectionTest.class, ClockTest.class, StateTest.class, StepTest.class, ActivityTest.class}) {
+                if (!tests.getSimpleName().contains(System.getProperty("visavis.only", ""))) {
+                    continue;
+                }
                 Method[] methods = tests.getDeclaredMethods();
                 Arrays.sort(methods, (a, b) -> a.getName().compareTo(b.getName()));
                 for (Method method : methods) {

@@ -26,7 +26,9 @@ final class ProjectionTest {
             float[][] points = {
                 {0, 0, 0}, {0, 1.9f, 0}, {0.7f, 1.4f, 0}, {-0.7f, 1.4f, 0}, {0, 0, 0.5f},
                 {-Projection.REACH_X, 0, Projection.NEAR_Z}, {Projection.REACH_X, 0, Projection.FAR_Z},
+                {Projection.REACH_X, 0, Projection.NEAR_Z}, {-Projection.REACH_X, 0, Projection.FAR_Z},
                 {-Projection.REACH_X, Projection.HEAD, Projection.FAR_Z}, {Projection.REACH_X, Projection.HEAD, Projection.NEAR_Z},
+                {Projection.REACH_X, Projection.HEAD, Projection.FAR_Z}, {-Projection.REACH_X, Projection.HEAD, Projection.NEAR_Z},
             };
             float low = Float.MAX_VALUE;
             float high = -Float.MAX_VALUE;
