@@ -3,7 +3,7 @@ package android.media;
 import java.util.Arrays;
 import java.util.Random;
 
-/** Plays in real time: takes samples off its buffer from when it is full, and loses the time in which there are none. */
+/** Plays in real time: takes samples off its buffer from when it is full, after a pause too, and loses the time in which there are none. */
 public class AudioTrack {
     public static final int MODE_STREAM = 1;
     public static final int WRITE_NON_BLOCKING = 1;

@@ -64,7 +64,7 @@ final class ActivityTest {
 
     /** Runs the main thread until the screen says so. */
     static void until(ScreenActivity activity, String part) throws InterruptedException {
-        for (int i = 0; i < 100; i++) {
+        for (int i = 0; i < 600; i++) {
             StandInLooper.run(100);
             if (text(activity).contains(part)) {
                 return;
@@ -260,13 +260,15 @@ final class ActivityTest {
             isTrue(StandInWindow.left(split) == 30 && StandInWindow.top(split) == 60 && split.getHeight() == size[1] - 100, "insets");
             View stage = all(content).stream().filter(v -> v instanceof StageView).findFirst().orElseThrow(AssertionError::new);
             isTrue(stage.getWidth() >= size[0] / 2 - 60 && stage.getHeight() >= (size[1] - 100) / 2, "the stage has at least half of " + size[0] + " x " + size[1]);
-            StandInWindow.touch(stage, MotionEvent.ACTION_DOWN, stage.getWidth() * 0.6f, stage.getHeight() * 0.8f);
+            float[] at = new float[3];
+            new Projection(stage.getWidth(), stage.getHeight(), 0, 0, 0, 0).project(0, 0, 1.5f, at);
+            StandInWindow.touch(stage, MotionEvent.ACTION_DOWN, at[0], at[1]);
             float x = activity.demo.motion().userX();
             float z = activity.demo.motion().userZ();
-            StandInWindow.touch(stage, MotionEvent.ACTION_MOVE, stage.getWidth() * 0.65f, stage.getHeight() * 0.8f);
+            StandInWindow.touch(stage, MotionEvent.ACTION_MOVE, at[0] + stage.getWidth() * 0.05f, at[1]);
             isTrue(activity.demo.motion().userX() > x, "right");
-            StandInWindow.touch(stage, MotionEvent.ACTION_MOVE, stage.getWidth() * 0.6f, stage.getHeight() * 0.7f);
-            isTrue(activity.demo.motion().userZ() < z, "up is further away");
+            StandInWindow.touch(stage, MotionEvent.ACTION_MOVE, at[0], at[1] - stage.getHeight() * 0.05f);
+            isTrue(activity.demo.motion().userZ() < z, "up is further away, of " + size[0] + " x " + size[1] + ": " + z + " to " + activity.demo.motion().userZ());
             StandInWindow.touch(stage, MotionEvent.ACTION_UP, 0, 0);
         }
         StandInScreen.close(activity);

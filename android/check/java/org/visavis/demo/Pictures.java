@@ -34,6 +34,9 @@ public final class Pictures {
             }
             StandInContext.assets = StandInAssets.folder(assets.toFile());
             take(assets);
+        } catch (AssertionError e) {
+            e.printStackTrace();
+            System.exit(1);
         } finally {
             for (File file : assets.toFile().listFiles()) {
                 Files.delete(file.toPath());
@@ -56,7 +59,7 @@ public final class Pictures {
         StandInContext.permitted = false;
         activity.microphone();
         StandInScreen.answer(activity, false, false);
-        activity.demo.motion().moveUser(0.9f, 2.0f);
+        activity.demo.motion().moveUser(0.8f, 1.6f);
         activity.demo.motion().setGazeStep(91);
         StandInLooper.run(2500);
         StandInAssets.density(2.75f);

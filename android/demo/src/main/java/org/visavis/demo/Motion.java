@@ -162,8 +162,6 @@ final class Motion extends Thread {
         if (speaker == null) {
             clock.start(now, false);
         } else {
-            // An output starts when its buffer is full.
-            speaker.fill(clock.heard(now) + Math.max(SOUND_AHEAD, speaker.room()));
             speaker.play(now);
         }
         try {
@@ -237,7 +235,6 @@ final class Motion extends Thread {
             if (speaker == null) {
                 clock.start(now, false);
             } else {
-                speaker.fill(clock.heard(now) + Math.max(SOUND_AHEAD, speaker.room()));
                 speaker.play(now);
             }
         }

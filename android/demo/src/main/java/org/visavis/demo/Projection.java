@@ -6,15 +6,15 @@ package org.visavis.demo;
  */
 final class Projection {
     /** Where the user may stand, relative to the middle of the stage, metres. */
-    static final float REACH_X = 1.3f;
+    static final float REACH_X = 0.9f;
     static final float NEAR_Z = 0.7f;
-    static final float FAR_Z = 2.3f;
+    static final float FAR_Z = 1.9f;
     /** Height of the user's head, metres. */
     static final float HEAD = 1.65f;
 
     private static final float DISTANCE = 6;
     private static final float TARGET_Y = 0.9f;
-    private static final float TARGET_Z = 0.8f;
+    private static final float TARGET_Z = 0.6f;
     /** What must be in the picture, as x, y, z from and to: the agent with its arms out, and the user's heads and discs. */
     private static final float[][] BOXES = {
         {-0.7f, 0, -0.5f, 0.7f, 1.95f, 0.6f},

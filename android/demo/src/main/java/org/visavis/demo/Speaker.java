@@ -58,7 +58,9 @@ final class Speaker implements AutoCloseable {
         }
     }
 
+    /** Goes on, with a full buffer: an output may not begin before. */
     void play(long now) {
+        fill(given() + track.getBufferSizeInFrames() / (double) voice.rate);
         started = now;
         asked = 0;
         clock.start(now, true);
@@ -72,11 +74,6 @@ final class Speaker implements AutoCloseable {
 
     void volume(float share) {
         track.setVolume(share);
-    }
-
-    /** Seconds of sound that it holds. */
-    double room() {
-        return track.getBufferSizeInFrames() / (double) voice.rate;
     }
 
     /** Session second up to which it has sound. */
