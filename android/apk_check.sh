@@ -60,6 +60,24 @@ java -Djava.library.path="$target/release" -cp "$work/classes:$work/standins:$wo
 grep -q '^digest ' "$work/host.log"
 diff <(grep '^digest ' "$work/host.log") <(grep '^digest ' "$work/dex.log")
 
+echo '-- pictures of the screens, the stage by OpenGL ES of this machine'
+if [ ! -f /usr/include/EGL/egl.h ] || [ -z "$(ls /usr/lib/*/dri/swrast_dri.so 2>/dev/null)" ]; then
+  export DEBIAN_FRONTEND=noninteractive
+  apt-get -qq install -y --no-install-recommends gcc libc6-dev libegl-dev libgles-dev libegl1 libgles2 libgl1-mesa-dri >"$work/mesa.log" 2>&1 || true
+fi
+gl=''
+java=$(dirname "$(dirname "$(realpath "$(command -v javac)")")")
+if cc -O1 -Wall -Werror -shared -fPIC -I"$java/include" -I"$java/include/linux" -o "$work/libgl.so" android/check/gl.c -lEGL -lGLESv2 2>"$work/gl.log"; then
+  gl=$work/libgl.so
+else
+  echo 'skipped: no OpenGL ES here; the pictures are without the stage'
+fi
+python3 -c 'import sys, zipfile; zipfile.ZipFile(sys.argv[1]).extract("assets/stage.bin", sys.argv[2])' "$out/demo.apk" "$work"
+java -ea -Djava.awt.headless=true -Djava.library.path="$target/release" -Dvisavis.gl="$gl" -Dvisavis.stage="$work/assets/stage.bin" \
+  -Dvisavis.strings=android/demo/src/main/res/values/strings.xml -cp "$work/classes:$work/standins:$work/tests" org.visavis.demo.Pictures \
+  models/visavis-base-i8.safetensors "$out/pictures" >"$work/pictures.log" 2>&1 || { tail -20 "$work/pictures.log"; exit 1; }
+grep -E '^(loading|stage|measure|failure|  shirt)' "$work/pictures.log"
+
 echo '-- a fault planted in the dex is found'
 baksmali d "$out/classes.dex" -o "$work/smali"
 python3 - "$work/smali/org/visavis/FrameLayout.smali" <<'FAULT'

@@ -67,7 +67,7 @@ def standins(api, classes):
     wrong, count = set(), 0
     for one in classes.values():
         simple = one.name.rpartition("/")[2].rpartition("$")[2]
-        if not one.name.startswith("android/") or simple.startswith("StandIn") or "StandIn" in one.name:
+        if not one.name.startswith(("android/", "javax/")) or simple.startswith("StandIn") or "StandIn" in one.name:
             continue
         if not SHOWN & one.modifiers:
             continue

@@ -51,7 +51,7 @@ def signatures(data):
     return found
 
 
-def gradle(android, badging, names, dex):
+def gradle(android, badging, names, kept, dex):
     script = (android / "demo/build.gradle.kts").read_text()
     said = lambda key: re.search(rf'{key} = "?([\w.]+)', script)[1]
     shown = lambda pattern: (re.search(pattern, badging) or [None, None])[1]
@@ -64,12 +64,12 @@ def gradle(android, badging, names, dex):
     ]:
         if want != found:
             yield f"{what} is {found}, Gradle's {want}"
-    assets = {"assets/" + n for group in re.findall(r"include\(([^)]*)\)", script) for n in re.findall(r'"([^"]*)"', group)}
+    assets = {"assets/" + n for group in re.findall(r"(?:include|resolve)\(([^)]*)\)", script) for n in re.findall(r'"([^"]*)"', group)}
     if assets != {n for n in names if n.startswith("assets/")}:
         yield f"assets are not Gradle's: {sorted(assets)}"
     stored = set(re.findall(r'"(\w+)"', re.search(r"noCompress \+= listOf\(([^)]*)\)", script)[1]))
-    if {n.rpartition(".")[2] for n in assets} - stored:
-        yield "Gradle would compress an asset"
+    if {n.rpartition(".")[2] for n in kept} != stored:
+        yield f"stored assets {sorted(kept)}, Gradle's {sorted(stored)}"
     sources = {str(f.relative_to(root))[:-5] for root in (android / "visavis/src/main/java", android / "demo/src/main/java")
                for f in root.rglob("*.java") if f.name != "package-info.java"}
     classes = {c.split("$")[0] for c in dex} - {"org/visavis/demo/R"}
@@ -101,7 +101,8 @@ def main():
         bad.append(f"signatures: {sorted(signatures(data))}")
     run = lambda *command: subprocess.run(command, capture_output=True, text=True, check=True).stdout
     listed = re.findall(r"Class descriptor  : 'L([^;]+);'", run("dexdump", apk))
-    bad += gradle(android, run("aapt", "dump", "badging", apk), names, listed)
+    kept = [i.filename for i in archive.infolist() if i.filename.startswith("assets/") and not i.compress_type]
+    bad += gradle(android, run("aapt", "dump", "badging", apk), names, kept, listed)
     print(f"{apk}: {len(data)} bytes, dex {dex[4:7].decode()}, {len(listed)} classes, signed {' and '.join(sorted(signatures(data)))}")
     for text in bad:
         print("BAD:", text)

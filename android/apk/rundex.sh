@@ -27,8 +27,10 @@ compile standins '' android/check/stubs
 compile sources "$work/standins" android/visavis/src/main/java android/demo/src/main/java
 compile tests "$work/standins:$work/sources" android/check/java
 rm -rf "$work/standins/org/visavis" # the app's own R is in the dex
+node android/apk/stage.mjs tests/goldens/tiny.safetensors "$work/stage.bin"
 for main in "$@"; do
-  java -Xcheck:jni -ea -Djava.awt.headless=true -Djava.library.path="$lib" -Dvisavis.strings=android/demo/src/main/res/values/strings.xml \
+  java -Xcheck:jni -ea -Djava.awt.headless=true -Djava.library.path="$lib" -Dvisavis.stage="$work/stage.bin" \
+    -Dvisavis.strings=android/demo/src/main/res/values/strings.xml \
     -cp "$work/dex.jar:$work/standins:$work/tests" "$main" tests/goldens/tiny.safetensors 200 6 >"$work/log" 2>&1 || { tail -30 "$work/log"; exit 1; }
   grep -E '^digest|passed|FAILED' "$work/log"
 done

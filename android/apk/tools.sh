@@ -9,7 +9,7 @@ tools=$(cd "$tools" && pwd)
 # aapt brings aapt and aapt2, android-framework-res the resources of API 29, proguard-cli tries the keep rules; the rest checks, and draws text.
 declare -A packages=(
   [javac]=openjdk-17-jdk-headless [aapt2]=aapt [apksigner]=apksigner [zipalign]=zipalign [proguard]=proguard-cli [dexdump]=dexdump
-  [enjarify]=enjarify [smali]=libsmali-java [python3]=python3 [xz]=xz-utils
+  [enjarify]=enjarify [smali]=libsmali-java [python3]=python3 [node]=nodejs [xz]=xz-utils
 )
 missing=()
 for command in "${!packages[@]}"; do command -v "$command" >/dev/null || missing+=("${packages[$command]}"); done

@@ -74,4 +74,8 @@ public class Canvas {
         paint.on(graphics);
         graphics.drawString(text, x, y);
     }
+
+    void image(java.awt.image.BufferedImage image) {
+        graphics.drawImage(image, 0, 0, null);
+    }
 }

@@ -235,12 +235,12 @@ final class ActivityTest {
             measurement.join();
             String[] lines = measurement.report().split("\n");
             int samplers = Bench.samplers(engine).length;
-            equal(Bench.HEAD, lines[0]);
+            equal(Bench.HEAD, lines[1]);
             for (int i = 0; i < 2 * samplers; i++) {
-                String[] cells = lines[1 + i].trim().split(" +");
+                String[] cells = lines[2 + i].trim().split(" +");
                 equal(Bench.SAMPLERS[i / 2].toString(), cells[0]);
                 equal(String.valueOf(1 + i % 2), cells[1]);
-                isTrue(Float.parseFloat(cells[2]) > 0 && Float.parseFloat(cells[5]) >= Float.parseFloat(cells[2]), lines[1 + i]);
+                isTrue(Float.parseFloat(cells[2]) > 0 && Float.parseFloat(cells[5]) >= Float.parseFloat(cells[2]), lines[2 + i]);
             }
             String[] minute = lines[lines.length - 1].trim().split(" +");
             equal("2", minute[0]);

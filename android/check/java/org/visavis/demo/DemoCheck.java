@@ -13,7 +13,7 @@ import java.util.Arrays;
 
 /**
  * Tests of the demo app on a JVM: every static method whose name starts with "test" of the classes below, in order. Arguments: the tiny bundle; further
- * ones are ignored. With -Dvisavis.only=PART only classes with that part in their name. Runs in the repository's root.
+ * ones are ignored. The system property visavis.stage names what android/apk/stage.mjs makes of the tiny bundle, visavis.strings the app's strings.xml. With -Dvisavis.only=PART only classes with that part in their name. Runs in the repository's root.
  */
 public final class DemoCheck {
     static File bundle;
@@ -28,10 +28,12 @@ public final class DemoCheck {
         for (String name : new String[] {"agent.wav", "user.wav"}) {
             Files.copy(Path.of("samples", name), assets.resolve(name));
         }
+        Files.copy(Path.of(System.getProperty("visavis.stage")), assets.resolve(StageData.ASSET));
         StandInContext.assets = StandInAssets.folder(assets.toFile());
         int count = 0;
         try {
-            for (Class<?> tests : new Class<?>[] {ProjectionTest.class, ClockTest.class, StateTest.class, StepTest.class, ActivityTest.class}) {
+            for (Class<?> tests : new Class<?>[] {ProjectionTest.class, ClockTest.class, StateTest.class, SceneTest.class, StepTest.class,
+                ActivityTest.class}) {
                 if (!tests.getSimpleName().contains(System.getProperty("visavis.only", ""))) {
                     continue;
                 }

@@ -5,6 +5,7 @@ import android.content.Intent;
 import android.content.StandInContext;
 import android.content.res.StandInAssets;
 import android.graphics.StandInPicture;
+import android.opengl.StandInGl;
 import android.os.StandInLooper;
 import android.view.StandInWindow;
 import android.view.View;
@@ -32,6 +33,7 @@ public final class Pictures {
             for (String name : new String[] {"agent.wav", "user.wav"}) {
                 Files.copy(Path.of("samples", name), assets.resolve(name));
             }
+            Files.copy(Path.of(System.getProperty("visavis.stage")), assets.resolve(StageData.ASSET));
             StandInContext.assets = StandInAssets.folder(assets.toFile());
             take(assets);
         } catch (AssertionError e) {
@@ -47,8 +49,11 @@ public final class Pictures {
     }
 
     private static void take(Path assets) throws Exception {
+        StandInAssets.delay = 30;
         DemoActivity activity = StandInScreen.open(new DemoActivity(), new Intent("main"), false);
+        StandInLooper.run(1500);
         picture(activity, "loading-panel", 1280, 800, 0);
+        StandInAssets.delay = 0;
         // A panel, a phone upright and on its side, a tablet.
         StandInScreen.close(activity);
         activity = StandInScreen.open(new DemoActivity(), new Intent("main"), false);
@@ -95,7 +100,33 @@ public final class Pictures {
         StandInWindow.lay(content, width, height);
         activity.refresh();
         BufferedImage image = StandInPicture.of(content, width, height);
+        if (name.startsWith("stage") && StandInGl.there()) {
+            dressed(image, name);
+        }
         ImageIO.write(image, "png", folder.resolve(name + ".png").toFile());
         System.out.println(name + ": " + width + " x " + height);
+    }
+
+    /** The agent's shirt and skin are in the picture, and the user's ring. */
+    private static void dressed(BufferedImage image, String name) {
+        int shirt = 0;
+        int skin = 0;
+        int ring = 0;
+        for (int y = 0; y < image.getHeight(); y++) {
+            for (int x = 0; x < image.getWidth(); x++) {
+                int pixel = image.getRGB(x, y);
+                int red = pixel >> 16 & 255;
+                int green = pixel >> 8 & 255;
+                int blue = pixel & 255;
+                shirt += blue > red + 50 && green > red + 15 && blue > 100 && blue < 210 ? 1 : 0;
+                skin += red > green + 25 && green > blue + 10 && red > 140 ? 1 : 0;
+                ring += red > green + 40 && blue > red + 15 ? 1 : 0;
+            }
+        }
+        double share = 1.0 / image.getWidth() / image.getHeight();
+        System.out.printf("  shirt %.2f %%, skin %.2f %%, ring %.2f %%%n", 100 * share * shirt, 100 * share * skin, 100 * share * ring);
+        if (share * shirt < 0.002 || share * skin < 0.0003 || share * ring < 0.0001) {
+            throw new AssertionError(name + ": the agent or the user is not in the picture");
+        }
     }
 }

@@ -43,6 +43,11 @@ public class AssetFileDescriptor implements Closeable {
 
             @Override
             public int read(byte[] into, int from, int count) throws IOException {
+                try {
+                    Thread.sleep(StandInAssets.delay);
+                } catch (InterruptedException e) {
+                    throw new IOException(e);
+                }
                 int got = left <= 0 ? -1 : super.read(into, from, (int) Math.min(count, left));
                 left -= Math.max(0, got);
                 return got;

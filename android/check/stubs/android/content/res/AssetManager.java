@@ -1,8 +1,10 @@
 package android.content.res;
 
 import java.io.File;
+import java.io.FileInputStream;
 import java.io.FileNotFoundException;
 import java.io.IOException;
+import java.io.InputStream;
 import java.io.RandomAccessFile;
 
 public final class AssetManager {
@@ -31,5 +33,9 @@ public final class AssetManager {
         }
         file.close();
         throw new FileNotFoundException(name);
+    }
+
+    public InputStream open(String name) throws IOException {
+        return new FileInputStream(new File(place, name));
     }
 }

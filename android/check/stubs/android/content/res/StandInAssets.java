@@ -10,6 +10,9 @@ import org.w3c.dom.NodeList;
 public final class StandInAssets {
     public static final Resources RESOURCES = new Resources();
 
+    /** Milliseconds that each read takes. */
+    public static volatile int delay;
+
     private StandInAssets() {}
 
     public static AssetManager folder(File folder) {

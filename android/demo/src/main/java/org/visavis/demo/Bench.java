@@ -9,7 +9,9 @@ import org.visavis.VisavisSession;
 
 /** Block times of each sampler with one and two threads, as fast as they go. */
 final class Bench {
-    static final String HEAD = "sampler   threads    p50    p95    p99    max ms  x real time";
+    private static final String ROW = "%-10s %7s %6s %6s %6s %6s %12s";
+    /** Above the rows; times are milliseconds. */
+    static final String HEAD = String.format(Locale.ROOT, ROW, "sampler", "threads", "p50", "p95", "p99", "max", "x real time");
     static final Sampler[] SAMPLERS = {Sampler.MIDPOINT4, Sampler.MIDPOINT2, Sampler.MIDPOINT1, Sampler.SINGLE};
 
     private Bench() {}
@@ -63,7 +65,12 @@ final class Bench {
         float mean = Math.max(1e-3f, sum / Math.max(1, ms.length));
         float[] sorted = ms.clone();
         Arrays.sort(sorted);
-        return String.format(Locale.ROOT, "%-10s %6d %6.1f %6.1f %6.1f %6.1f %16.1f", sampler, threads, BlockTimes.rank(sorted, 0.5),
-                BlockTimes.rank(sorted, 0.95), BlockTimes.rank(sorted, 0.99), BlockTimes.rank(sorted, 1), BlockTimes.DEADLINE / mean);
+        return String.format(Locale.ROOT, ROW, sampler, threads, one(BlockTimes.rank(sorted, 0.5)), one(BlockTimes.rank(sorted, 0.95)),
+                one(BlockTimes.rank(sorted, 0.99)), one(BlockTimes.rank(sorted, 1)), one(BlockTimes.DEADLINE / mean));
+    }
+
+    /** With one decimal. */
+    static String one(float value) {
+        return String.format(Locale.ROOT, "%.1f", value);
     }
 }

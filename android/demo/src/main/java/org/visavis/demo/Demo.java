@@ -24,6 +24,7 @@ final class Demo {
     private int owners;
     private boolean closed;
     private Thread loader;
+    private volatile StageData stage;
     private volatile Wav agent;
     private volatile Wav user;
     private volatile VisavisEngine engine;
@@ -56,6 +57,11 @@ final class Demo {
     /** Null until it is loaded. */
     Motion motion() {
         return motion;
+    }
+
+    /** Null until it is loaded. */
+    StageData stage() {
+        return stage;
     }
 
     /** Null until it is loaded. */
@@ -108,6 +114,9 @@ final class Demo {
             Wav first = voice("agent.wav");
             loading.step("The user's voice", 0.12f);
             Wav second = voice("user.wav");
+            doing = "loading the stage";
+            loading.step("Stage", 0.3f);
+            StageData body = StageData.read(assets.open(StageData.ASSET));
             doing = "loading the model";
             loading.step("Model", 0.7f);
             readModel();
@@ -115,7 +124,7 @@ final class Demo {
             made = VisavisEngine.fromAsset(assets, BUNDLE);
             doing = "starting the conversation";
             loading.step("First blocks", 1);
-            begin(made, first, second, new Motion(made, first, second, life, microphone));
+            begin(body, made, first, second, new Motion(made, first, second, life, microphone));
         } catch (IOException | RuntimeException | Error e) {
             if (made != null) {
                 made.close();
@@ -125,12 +134,13 @@ final class Demo {
     }
 
     /** On the loading thread: the conversation begins, unless the app was closed meanwhile. */
-    private synchronized void begin(VisavisEngine made, Wav first, Wav second, Motion begun) {
+    private synchronized void begin(StageData body, VisavisEngine made, Wav first, Wav second, Motion begun) {
         if (closed) {
             begun.discard();
             made.close();
             return;
         }
+        stage = body;
         engine = made;
         agent = first;
         user = second;

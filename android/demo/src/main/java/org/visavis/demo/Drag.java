@@ -9,7 +9,7 @@ final class Drag {
     private float height;
     private float offsetX;
     private float offsetY;
-    private boolean active;
+    private volatile boolean active;
     private final float[] screen = new float[3];
 
     /** @param reach pixels from the head or the disc at which a finger takes it */

@@ -28,5 +28,8 @@ final class FailureScreen implements Screen {
     }
 
     @Override
+    public void shown(boolean now) {}
+
+    @Override
     public void refresh(long now) {}
 }

@@ -10,7 +10,9 @@ import org.visavis.VisavisSession;
 
 /** A conversation in real time, minute by minute: block times, what the governor made of them, and how hot the device became. */
 final class HeatRun {
-    static final String HEAD = "minute    p50    p95    max ms   late  evals  down  up  held   heat";
+    private static final String ROW = "%6s %6s %6s %6s %5s %6s %5s %4s %5s   %s";
+    /** Above the rows; times are milliseconds. */
+    static final String HEAD = String.format(Locale.ROOT, ROW, "minute", "p50", "p95", "max", "late", "evals", "down", "up", "held", "heat");
     private static final float BUDGET = 100;
 
     private final VisavisSession session;
@@ -76,9 +78,9 @@ final class HeatRun {
         Arrays.sort(sorted);
         float battery = heat.battery();
         String degrees = Float.isNaN(battery) ? "" : String.format(Locale.ROOT, ", %.1f C", battery);
-        return String.format(Locale.ROOT, "%6d %6.1f %6.1f %6.1f %9d %6.1f %5d %3d %5d   %s%s", number, BlockTimes.rank(sorted, 0.5),
-                BlockTimes.rank(sorted, 0.95), BlockTimes.rank(sorted, 1), late, evaluations, after.governorDown - before.governorDown,
-                after.governorUp - before.governorUp, after.governorHeldBlocks - before.governorHeldBlocks, heat.status(), degrees);
+        return String.format(Locale.ROOT, ROW, number, Bench.one(BlockTimes.rank(sorted, 0.5)), Bench.one(BlockTimes.rank(sorted, 0.95)),
+                Bench.one(BlockTimes.rank(sorted, 1)), late, Bench.one(evaluations), after.governorDown - before.governorDown,
+                after.governorUp - before.governorUp, after.governorHeldBlocks - before.governorHeldBlocks, heat.status() + degrees);
     }
 
     void close() {

@@ -30,6 +30,9 @@ final class LoadingScreen implements Screen {
     }
 
     @Override
+    public void shown(boolean now) {}
+
+    @Override
     public void refresh(long now) {
         bar.setProgress(Math.round(1000 * loading.fraction()));
         Ui.show(step, loading.step());

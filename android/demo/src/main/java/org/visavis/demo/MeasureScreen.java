@@ -54,6 +54,9 @@ final class MeasureScreen implements Screen {
     }
 
     @Override
+    public void shown(boolean now) {}
+
+    @Override
     public void refresh(long now) {
         boolean under = !measurement.doing().isEmpty();
         doing.setText(under ? measurement.doing() : "Measured");

@@ -85,6 +85,7 @@ final class Measurement extends Thread {
     }
 
     private void table() throws InterruptedException {
+        line("Block times in ms, as fast as they go; deadline 133:");
         line(Bench.HEAD);
         Sampler[] samplers = Bench.samplers(engine);
         for (int i = 0; i < samplers.length; i++) {
@@ -101,7 +102,7 @@ final class Measurement extends Thread {
             return;
         }
         line("");
-        line("In real time, with the governor, budget 100 ms a block:");
+        line("In real time, with the governor, budget 100 ms per block:");
         line(HeatRun.HEAD);
         HeatRun run = new HeatRun(engine, agent, user, heat, times);
         try {

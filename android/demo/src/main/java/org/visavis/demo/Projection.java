@@ -29,8 +29,8 @@ final class Projection {
     private final float scale;
     private final float originX;
     private final float originY;
-    private float centreX;
-    private float centreZ;
+    private volatile float centreX;
+    private volatile float centreZ;
 
     /** Of a view of this size, of which the insets (pixels) are covered by something else. */
     Projection(float width, float height, float insetLeft, float insetTop, float insetRight, float insetBottom) {

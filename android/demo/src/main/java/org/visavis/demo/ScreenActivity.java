@@ -21,6 +21,7 @@ abstract class ScreenActivity extends Activity {
     private Screen screen;
     private Object shown;
     private boolean started;
+    private boolean resumed;
 
     private final Runnable tick = new Runnable() {
         @Override
@@ -48,6 +49,24 @@ abstract class ScreenActivity extends Activity {
     }
 
     @Override
+    protected void onResume() {
+        super.onResume();
+        resumed = true;
+        if (screen != null) {
+            screen.shown(true);
+        }
+    }
+
+    @Override
+    protected void onPause() {
+        super.onPause();
+        resumed = false;
+        if (screen != null) {
+            screen.shown(false);
+        }
+    }
+
+    @Override
     protected void onStop() {
         super.onStop();
         started = false;
@@ -70,6 +89,9 @@ abstract class ScreenActivity extends Activity {
         Object subject = failure != null ? failure : demo.life.isLoaded() ? subject() : null;
         if (screen == null || subject != shown) {
             shown = subject;
+            if (screen != null) {
+                screen.shown(false);
+            }
             if (failure != null) {
                 Log.e(TAG, failure.toString());
                 screen = failureScreen(failure);
@@ -77,6 +99,7 @@ abstract class ScreenActivity extends Activity {
                 screen = subject == null ? new LoadingScreen(this, demo.loading) : screen();
             }
             root.show(screen.view());
+            screen.shown(resumed);
         }
         screen.refresh(System.nanoTime());
     }

@@ -30,11 +30,13 @@ final class StageScreen implements Screen {
     private final Button hold;
     private final Button choose;
     private final Button microphone;
+    private final String starting;
 
     StageScreen(final Context context, final Demo demo, final Actions actions) {
         this.demo = demo;
         motion = demo.motion();
-        stage = new StageView(context, motion, demo.engine().skeleton(), demo.life);
+        starting = context.getString(R.string.starting);
+        stage = new StageView(context, motion, demo.engine().skeleton(), demo.life, demo.stage());
         LinearLayout panel = Ui.column(context, 12);
         panel.setBackgroundColor(Ui.PANEL);
         status = Ui.text(panel, 14, Ui.TEXT);
@@ -111,9 +113,21 @@ final class StageScreen implements Screen {
     }
 
     @Override
+    public void shown(boolean now) {
+        if (now) {
+            stage.onResume();
+        } else {
+            stage.onPause();
+        }
+    }
+
+    @Override
     public void refresh(long now) {
         String why = demo.life.says();
-        Ui.show(status, why.isEmpty() ? motion.times().says() : why);
+        if (why.isEmpty()) {
+            why = motion.times().count() == 0 ? starting : motion.times().says();
+        }
+        Ui.show(status, why);
         Ui.show(sound, motion.note());
         Ui.show(voice, demo.microphone.says(now));
         boolean runs = demo.life.runs();
@@ -122,5 +136,6 @@ final class StageScreen implements Screen {
         microphone.setText(demo.microphone.action());
         view.setKeepScreenOn(runs);
         bars.invalidate();
+        stage.refresh();
     }
 }
