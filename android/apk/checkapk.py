@@ -12,6 +12,7 @@ import zipfile
 import zlib
 
 SCHEMES = {0x7109871A: "v2", 0xF05368C0: "v3"}
+PADDING = 0x42726577
 ARM64 = 183
 
 
@@ -46,7 +47,8 @@ def signatures(data):
     at, found = directory - struct.unpack_from("<Q", data, directory - 24)[0], set()
     while at < directory - 24:
         length, scheme = struct.unpack_from("<QI", data, at)
-        found.add(SCHEMES.get(scheme, hex(scheme)))
+        if scheme != PADDING:
+            found.add(SCHEMES.get(scheme, hex(scheme)))
         at += 8 + length
     return found
 
