@@ -29,10 +29,10 @@ pub struct Networks {
     pub reference: bool,
     /// The student of the single-step sampler, where the bundle has one.
     pub student: bool,
-    /// The encoder of motion. Without it sessions do not re-anchor, whatever [`crate::session::Anchoring`] says.
+    /// The encoder of motion. Without it sessions do not re-anchor, whatever their options say.
     pub encoder: bool,
     /// The weights that make the modulation of any flow time, a fifth of a flow network. Without them sessions have the bundle's own flow times:
-    /// [`Sampler::Midpoint`], [`Sampler::Euler`] with 1, 2, 4 or 8 steps, [`Sampler::Single`], and [`crate::session::HistoryTime::Bundle`].
+    /// [`Sampler::Midpoint`], [`Sampler::Euler`] with 1, 2, 4 or 8 steps, and [`Sampler::Single`].
     pub modulation: bool,
 }
 
@@ -44,7 +44,7 @@ impl Default for Networks {
 }
 
 /// A loaded model: networks packed for this CPU, rig and statistics. Immutable and shared; all that changes is in
-/// [`Session`].
+/// [`Session`](crate::Session).
 ///
 /// ```no_run
 /// # fn main() -> visavis::Result<()> {

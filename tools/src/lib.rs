@@ -9,7 +9,7 @@
 //! | [`eval`] | a bundle judged on recorded conversations |
 //! | [`report`] | what quantised bundles lose and cost |
 //! | [`soak`] | one session driven for hours |
-//! | [`bench`] | block times, stages, memory |
+//! | [`mod@bench`] | block times, stages, memory |
 //! | [`trace`] | every stage of a session on disk |
 //!
 //! The runtime itself is the crate [`visavis`].

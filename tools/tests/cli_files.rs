@@ -9,7 +9,7 @@ use cli::{Scratch, names, succeeds};
 use common::{Golden, max_error};
 use safetensors::SafeTensors;
 
-const TINY: &str = "tests/goldens/tiny.safetensors";
+const TINY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/goldens/tiny.safetensors");
 const GOLDEN: &str = "tests/goldens/tiny-golden.safetensors";
 
 #[test]

@@ -85,7 +85,7 @@ impl UserPath {
 
     /// The head at `time` (s), linear between positions; `None` outside the path and inside gaps of more than half a second.
     ///
-    /// For tools that know the whole path; a session uses [`super::HeadTrack`], which does not look ahead.
+    /// For tools that know the whole path; a session tracks the head as it comes and does not look ahead.
     pub fn at(&self, time: f64) -> Option<Vec3> {
         let after = self.points.partition_point(|p| p.0 <= time);
         let &(t0, p0) = self.points.get(after.checked_sub(1)?)?;
