@@ -9,7 +9,8 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use visavis::internals::kernels::Scheme;
 use visavis::internals::session::Anchoring;
-use visavis::{Budget, Governor, Hold, Sampler, SessionOptions};
+use visavis::replay::Hold;
+use visavis::{Budget, Governor, Sampler, SessionOptions};
 
 /// The system's allocator, counting what is asked of it while `WATCH` is set.
 struct Counting;

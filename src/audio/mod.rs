@@ -14,7 +14,9 @@ mod voice;
 mod weights;
 
 pub use encoder::AudioEncoder;
-pub use resample::{MAX_RATE, MIN_RATE, Resampler, check_rate, resample_to_24k};
+#[cfg(feature = "internals")]
+pub use resample::resample_to_24k;
+pub use resample::{MAX_RATE, MIN_RATE, Resampler, check_rate};
 #[cfg(feature = "tract")]
 pub use tract::TractEncoder;
 pub use voice::{VOICE_SECONDS, Voice, VoiceStats};

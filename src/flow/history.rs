@@ -44,11 +44,6 @@ impl History {
         self.len == self.first
     }
 
-    /// Index of the first token that there ever was.
-    pub fn first(&self) -> u64 {
-        self.first
-    }
-
     /// Sets the conditioning of the token being made and hands out its noise to be filled.
     pub fn begin(&mut self, condition: &Condition) -> &mut [f32] {
         let slot = self.slot(self.len);

@@ -35,6 +35,7 @@ impl<'a> RowTable<'a> {
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
     /// Rows of a call, typically; more are worked through in portions of 16.
+    #[cfg_attr(not(feature = "internals"), expect(dead_code))]
     pub rows: usize,
     /// Largest `in_features` of any matrix.
     pub width: usize,
@@ -110,6 +111,7 @@ impl Exec {
     }
 
     /// The kernels in use.
+    #[cfg(feature = "internals")]
     pub fn kernels(&self) -> Kernels {
         self.kernels
     }
@@ -125,6 +127,7 @@ impl Exec {
     }
 
     /// Lets `activations` listen to the linear layers from here on (`None`: nobody) and returns what listened so far.
+    #[cfg(feature = "internals")]
     pub fn listen(&mut self, activations: Option<Activations>) -> Option<Activations> {
         std::mem::replace(&mut self.activations, activations)
     }
@@ -238,6 +241,7 @@ impl Exec {
     }
 
     /// GELU, tanh form, in place.
+    #[cfg(feature = "internals")]
     pub fn gelu(&mut self, x: &mut [f32]) {
         // SAFETY: a `Kernels` exists only for a level that this CPU has.
         unsafe { (self.kernels.gelu.run.gelu)(x) }

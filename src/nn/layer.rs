@@ -68,18 +68,8 @@ impl Rows {
     }
 
     /// Number of rows.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.base.len()
-    }
-
-    /// Whether there are no rows.
-    pub fn is_empty(&self) -> bool {
-        self.base.is_empty()
-    }
-
-    /// Positions, a row each.
-    pub fn positions(&self) -> &[u64] {
-        &self.positions
     }
 
     /// Writes the rows' keys and values of layer `layer` to `cache`, then attends over each row's span: `qkv` is `rows x 3d`, `out`

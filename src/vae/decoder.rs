@@ -133,6 +133,7 @@ impl DecoderState {
     ///
     /// # Panics
     /// When there is none.
+    #[cfg(feature = "internals")]
     pub fn back(&mut self) {
         self.0.back();
     }

@@ -188,6 +188,7 @@ impl StackState {
     }
 
     /// Takes back the last block: the next one is written over it.
+    #[cfg(feature = "internals")]
     pub(super) fn back(&mut self) {
         self.block -= 1;
     }

@@ -12,6 +12,8 @@ mod scalar;
 
 /// The two activations of one variant.
 pub(crate) struct Kernel {
+    /// In a network it is part of the epilogue; benchmarks and tests run it alone.
+    #[cfg_attr(not(feature = "internals"), expect(dead_code))]
     pub(crate) gelu: unsafe fn(&mut [f32]),
     pub(crate) silu: unsafe fn(&mut [f32]),
 }
