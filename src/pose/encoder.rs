@@ -2,6 +2,7 @@
 
 use super::icosahedron::encode;
 use crate::frame::{JOINT_CHANNELS, ROOT_CHANNELS, Root, Transform, feature_count};
+use crate::normaliser::Metric;
 use glam::Vec3;
 
 /// The root of a body whose hips are at `hips` (world): floor projection of the hips, heading of their +Z axis.
@@ -14,7 +15,7 @@ pub fn root_of(hips: &Transform, yaw: f64) -> Root {
     Root { x: f64::from(hips.position.x), z: f64::from(hips.position.z), yaw }
 }
 
-/// The way back: world transforms of consecutive frames to unstandardised feature vectors.
+/// The way back: world transforms of consecutive frames to feature vectors.
 ///
 /// With the roots that a [`Decoder`](super::Decoder) gave, it returns what the decoder was given, vertices made rigid.
 #[derive(Debug, Clone)]
@@ -34,12 +35,13 @@ impl Encoder {
         self.previous = previous;
     }
 
-    /// Writes the feature vector of the next frame, whose root is `root` ([`root_of`], or [`Frame::root`](crate::frame::Frame::root)) and whose joints
-    /// stand at `global` (world, J of them), to `x`.
+    /// Writes the feature vector of the next frame, whose root is `root` ([`root_of`], or
+    /// [`Frame::root`](crate::frame::Frame::root)) and whose joints stand at `global` (world, J of them), to `x`.
     ///
     /// # Panics
     /// If `x` is not `3 + 36 J` long.
-    pub fn encode(&mut self, root: Root, global: &[Transform], x: &mut [f32]) {
+    pub fn encode(&mut self, root: Root, global: &[Transform], mut x: Metric<&mut [f32]>) {
+        let x = x.values_mut();
         assert_eq!(x.len(), feature_count(global.len()), "a feature vector has 3 + 36 J values");
         let (head, joints) = x.split_at_mut(ROOT_CHANNELS);
         head.copy_from_slice(&step(self.previous.unwrap_or(root), root));
