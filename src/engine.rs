@@ -256,15 +256,6 @@ impl Engine {
         Nets { reference: self.flow.as_ref(), student }
     }
 
-    /// The encoder of motion, for whoever cannot do without.
-    ///
-    /// # Errors
-    /// [`ErrorKind::State`] when it was not loaded.
-    pub(crate) fn encoder(&self) -> Result<&Encoder> {
-        let missing = || Error::new(ErrorKind::State, "this engine was loaded without the encoder; load all networks");
-        self.encoder.as_ref().ok_or_else(missing)
-    }
-
     /// The model's name, as its bundle tells it.
     pub fn name(&self) -> &str {
         &self.config.name

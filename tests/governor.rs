@@ -4,7 +4,8 @@ mod common;
 
 use common::{Inputs, poll_blocks, run, tiny};
 use visavis::internals::session::Anchoring;
-use visavis::{Budget, ErrorKind, Frame, Governor, Hold, Sampler, Session, SessionOptions};
+use visavis::replay::Hold;
+use visavis::{Budget, ErrorKind, Frame, Governor, Sampler, Session, SessionOptions};
 
 /// Milliseconds of the last block on a device that is `slow` times slower than one that does eight evaluations in 40 ms.
 fn clock(session: &Session, slow: f64) -> f64 {

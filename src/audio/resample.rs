@@ -77,12 +77,6 @@ impl Resampler {
         self.sinc.as_ref().map_or(0, |s| s.latency)
     }
 
-    /// [`Resampler::latency_samples`] in seconds: 0 at 24 kHz, else 1.7 ms from 22.9 kHz up, 2.4 ms at 16 kHz,
-    /// 4.5 ms at 8 kHz.
-    pub fn latency(&self) -> f64 {
-        self.latency_samples() as f64 / f64::from(SAMPLE_RATE)
-    }
-
     /// Converts `input` and hands what is ready to `out`, in order, in pieces. `input` must be finite.
     pub fn push(&mut self, input: &[f32], mut out: impl FnMut(&[f32])) {
         match &mut self.sinc {
@@ -112,6 +106,7 @@ impl Resampler {
 ///
 /// # Errors
 /// [`ErrorKind::Audio`] for a rate outside 8 to 192 kHz.
+#[cfg(feature = "internals")]
 pub fn resample_to_24k(samples: &[f32], rate: u32) -> Result<Vec<f32>> {
     let mut resampler = Resampler::new(rate)?;
     let mut out = Vec::with_capacity(outputs(samples.len() as u64, rate) as usize);

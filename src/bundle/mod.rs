@@ -5,7 +5,6 @@
 
 mod audio;
 mod check;
-mod contents;
 mod drawn;
 mod file;
 mod parse;
@@ -15,11 +14,10 @@ mod stored;
 mod tensors;
 
 pub use audio::AudioSource;
-pub use contents::{Contents, TensorInfo};
 pub use file::{BundleFile, LoadMode};
 pub(crate) use rewrite::{Entry, assemble, entries, failed, floats};
 pub use stored::{SMALL, StoredData, StoredWeights, int16_activations};
-pub use tensors::Tensors;
+pub use tensors::{TensorInfo, Tensors};
 
 use crate::error::{Error, ErrorKind};
 

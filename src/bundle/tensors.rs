@@ -8,8 +8,34 @@ use crate::error::Result;
 use crate::kernels::Scheme;
 use safetensors::SafeTensors;
 use safetensors::tensor::TensorView;
+use serde::Serialize;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashSet};
+
+/// One tensor of a bundle.
+#[derive(Debug, Clone, Serialize)]
+pub struct TensorInfo {
+    /// Name.
+    pub name: String,
+    /// Storage type: `f32` or `f16`, for quantised weights their scheme (`i8`, `i4`).
+    pub dtype: String,
+    /// Shape, row-major; two int4 weights count as one element.
+    pub shape: Vec<usize>,
+    /// Bytes in the file.
+    pub bytes: usize,
+}
+
+impl TensorInfo {
+    /// Number of parameters; the padding of int4 rows of odd length counts, scales of quantised weights do not.
+    pub fn elements(&self) -> usize {
+        let n = self.shape.iter().product();
+        match self.dtype.as_str() {
+            "i4" => 2 * n,
+            _ if self.name.ends_with(".scale") => 0,
+            _ => n,
+        }
+    }
+}
 
 /// The tensors of a parsed bundle. Each read checks name, dtype, shape and finiteness, and is remembered, so that
 /// [`Tensors::finish`] can name what nobody asked for.
@@ -70,9 +96,9 @@ impl<'a> Tensors<'a> {
     }
 
     /// Names, dtypes, shapes and sizes, sorted by name; the dtype of quantised weights is their scheme.
-    pub fn infos(&self) -> Vec<super::TensorInfo> {
+    pub fn infos(&self) -> Vec<TensorInfo> {
         let mut infos: Vec<_> = (self.container.iter().flat_map(SafeTensors::iter))
-            .map(|(name, view)| super::TensorInfo {
+            .map(|(name, view)| TensorInfo {
                 name: name.to_owned(),
                 dtype: match self.recorded(name) {
                     Some(scheme) => scheme.to_string(),

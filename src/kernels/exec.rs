@@ -15,6 +15,7 @@ use crate::par::{FlushToZero, Pool};
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
     /// Rows of a call, typically; more are worked through in portions of 16.
+    #[cfg_attr(not(feature = "internals"), expect(dead_code))]
     pub rows: usize,
     /// Largest `in_features` of any matrix.
     pub width: usize,
@@ -63,6 +64,7 @@ impl Exec {
     }
 
     /// The kernels in use.
+    #[cfg(feature = "internals")]
     pub fn kernels(&self) -> Kernels {
         self.kernels
     }
@@ -78,6 +80,7 @@ impl Exec {
     }
 
     /// Lets `activations` listen to the linear layers from here on (`None`: nobody) and returns what listened so far.
+    #[cfg(feature = "internals")]
     pub fn listen(&mut self, activations: Option<Activations>) -> Option<Activations> {
         std::mem::replace(&mut self.activations, activations)
     }
@@ -202,6 +205,7 @@ impl Exec {
     }
 
     /// GELU, tanh form, in place.
+    #[cfg(feature = "internals")]
     pub fn gelu(&mut self, x: &mut [f32]) {
         self.kernels.gelu.run(Activation::Gelu, x);
     }

@@ -42,8 +42,6 @@ pub struct Fit {
     plans: Vec<Plan>,
     parents: Vec<Option<usize>>,
     offsets: Vec<Vec3>,
-    /// The fitted joints, in the frame of the input.
-    placed: Vec<Transform>,
     /// Local rotations of the frame before.
     previous: Vec<Quat>,
 }
@@ -57,7 +55,6 @@ impl Fit {
             plans: (0..n).map(|j| plan(rig, j)).collect(),
             parents: rig.joints.iter().map(|j| j.parent).collect(),
             offsets: (0..n).map(|j| rig.offset(j)).collect(),
-            placed: vec![Transform::IDENTITY; n],
             previous: vec![Quat::IDENTITY; n],
         }
     }
@@ -68,18 +65,8 @@ impl Fit {
     }
 
     /// Fits the rig to `joints` (J transforms in the heading frame of `root`; with `Root::default()` in the world) and
-    /// fills `hips`, `local` and `fit_error` of `frame`. The hips are where they were decoded.
-    ///
-    /// # Panics
-    /// If `joints` is not J long.
-    pub fn fit(&mut self, joints: &[Transform], root: &Root, frame: &mut Frame) {
-        let mut placed = std::mem::take(&mut self.placed);
-        self.turn(&mut placed, joints, root, frame);
-        self.placed = placed;
-        self.sign(frame);
-    }
-
-    /// What [`Fit::fit`] does but for signs, which depend on the frame before. `placed` is scratch for J transforms.
+    /// fills `hips`, `local` and `fit_error` of `frame`, but for the signs of rotations, which depend on the frame before
+    /// ([`Fit::sign`]). The hips are where they were decoded. `placed` is scratch for J transforms.
     pub(super) fn turn(&self, placed: &mut [Transform], joints: &[Transform], root: &Root, frame: &mut Frame) {
         assert_eq!(joints.len(), self.plans.len(), "one transform a joint");
         frame.local.resize(joints.len(), Quat::IDENTITY);

@@ -1,5 +1,4 @@
-use super::super::features::{Decoder, Encoder};
-use super::super::{feature_count, synthetic};
+use super::super::{Decoder, Encoder, feature_count, synthetic};
 use super::*;
 use crate::frame::{Frame, ROOT_CHANNELS};
 use crate::kernels::Kernels;

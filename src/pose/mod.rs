@@ -8,6 +8,8 @@
 //! Everything is right-handed, metres, Y up; nothing here allocates once it is built.
 
 mod bridge;
+#[cfg(feature = "internals")]
+mod encoder;
 mod features;
 mod fit;
 mod gaze;
@@ -15,12 +17,14 @@ mod guard;
 pub mod icosahedron;
 pub mod openxr;
 mod stance;
-#[cfg(any(test, feature = "internals"))]
+#[cfg(feature = "internals")]
 pub mod synthetic;
 
 pub use crate::frame::feature_count;
 pub use crate::rig::{Joint, MAX_JOINTS, Rig};
-pub use features::{Decoder, Encoder, root_of};
+#[cfg(feature = "internals")]
+pub use encoder::{Encoder, root_of};
+pub use features::Decoder;
 pub use fit::Fit;
 pub use gaze::gaze_score;
 pub use guard::{

@@ -23,10 +23,9 @@ use std::time::Instant;
 /// A team has threads of its own: make the sessions with one thread.
 ///
 /// ```no_run
-/// # fn main() -> visavis::error::Result<()> {
-/// use visavis::engine::Engine;
-/// use visavis::session::SessionOptions;
+/// use visavis::{Engine, SessionOptions};
 ///
+/// # fn main() -> visavis::Result<()> {
 /// let engine = Engine::load("models/visavis-base-i8.safetensors")?;
 /// let mut team = engine.team(2)?;
 /// let mut a = engine.session(SessionOptions { seed: 1, ..SessionOptions::default() })?;

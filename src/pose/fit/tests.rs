@@ -9,8 +9,13 @@ fn fit_for(rig: &Rig) -> Fit {
 
 fn fitted(fit: &mut Fit, joints: &[Transform]) -> Frame {
     let mut frame = Frame::empty(joints.len());
-    fit.fit(joints, &Root::default(), &mut frame);
+    fit_at(fit, joints, &Root::default(), &mut frame);
     frame
+}
+
+fn fit_at(fit: &mut Fit, joints: &[Transform], root: &Root, frame: &mut Frame) {
+    fit.turn(&mut vec![Transform::IDENTITY; joints.len()], joints, root, frame);
+    fit.sign(frame);
 }
 
 fn placed(recording: &Walk, frame: &Frame) -> Vec<Transform> {
@@ -128,7 +133,7 @@ fn far_from_the_origin_the_heading_frame_keeps_precision() {
     let frame = &recording.frames[1];
     let root = Root { x: 4_000.0, z: -7_000.0, yaw: 1.0 };
     let mut got = Frame::empty(recording.rig.len());
-    fit_for(&recording.rig).fit(&frame.global, &root, &mut got);
+    fit_at(&mut fit_for(&recording.rig), &frame.global, &root, &mut got);
     assert!(got.fit_error < 1e-5);
     let turned = root.rotation() * frame.local[0];
     assert!(got.local[0].dot(turned).abs() > 1.0 - 1e-5);

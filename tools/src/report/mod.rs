@@ -26,11 +26,11 @@ pub use speed::Speed;
 pub use spread::Spread;
 pub use targets::Target;
 
+use crate::contents::Contents;
 use crate::offline::Conversation;
 use numerics::Loaded;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use visavis::internals::bundle::Contents;
 use visavis::internals::kernels::{Kernels, Scheme};
 use visavis::{BundleFile, Engine, Error, ErrorKind, Result};
 

@@ -3,7 +3,8 @@
 use super::{Voices, script::Script};
 use crate::metrics::switch_seam;
 use std::sync::Arc;
-use visavis::{Decision, Engine, Governor, Hold, Plan, Result, Sampler, SessionOptions};
+use visavis::replay::{Decision, Hold, Plan};
+use visavis::{Engine, Governor, Result, Sampler, SessionOptions};
 
 /// Blocks between two switches.
 const STAY: u64 = 6;
