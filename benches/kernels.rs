@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use half::f16;
-use visavis::kernels::{
+use visavis::internals::kernels::{
     Epilogue, Exec, I4_GROUP, Kernels, KvCache, KvDtype, Limits, Matrix, RowTable, Span, WeightData, Weights,
 };
 

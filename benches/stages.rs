@@ -8,10 +8,11 @@ use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use glam::Vec3;
-use visavis::bench::{STAGES, Size, StageTimes};
-use visavis::frame::{BLOCK_SAMPLES, SAMPLE_RATE, Sampler};
-use visavis::kernels::{Kernels, Scheme};
-use visavis::session::{Anchoring, Session, SessionOptions};
+use visavis::internals::frame::BLOCK_SAMPLES;
+use visavis::internals::kernels::{Kernels, Scheme};
+use visavis::internals::session::Anchoring;
+use visavis::{SAMPLE_RATE, Sampler, Session, SessionOptions};
+use visavis_tools::bench::{STAGES, Size, StageTimes};
 
 /// Computes `blocks` blocks; the time of stage `stage`, or of all.
 fn blocks(session: &mut Session, samples: &[f32], blocks: u64, stage: Option<usize>) -> Duration {

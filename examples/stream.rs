@@ -14,10 +14,7 @@
 use glam::Vec3;
 use std::collections::VecDeque;
 use std::f32::consts::{PI, TAU};
-use visavis::engine::Engine;
-use visavis::error::Result;
-use visavis::frame::Frame;
-use visavis::session::SessionOptions;
+use visavis::{Engine, Frame, Result, SessionOptions};
 
 const SECONDS: u32 = 12;
 const AUDIO_RATE: u32 = 48_000;
@@ -28,8 +25,8 @@ fn main() -> Result<()> {
     let engine = Engine::load(&bundle)?;
     // Once a user: all memory that the session will need is taken here.
     let mut session = engine.session(SessionOptions { seed: 1, ..SessionOptions::default() })?;
-    let head = engine.config().rig.index("head").unwrap_or(0);
-    println!("{}: {} joints, kernels {}", engine.config().name, engine.config().rig.len(), engine.kernels().level());
+    let head = engine.rig().index("head").unwrap_or(0);
+    println!("{}: {} joints, kernels {}", engine.name(), engine.rig().len(), engine.cpu_level());
 
     // What the agent says is known ahead (text-to-speech), so it is pushed as a whole utterance, at the voice's own rate.
     session.push_agent_audio(&babble(0.0, 5.0, 130.0, 22_050), 22_050)?;

@@ -19,7 +19,7 @@ kit=${ARM64_KIT:-../shared/android}
 target=aarch64-unknown-linux-gnu
 CARGO_TARGET_DIR=$(target_dir arm64)
 export CARGO_TARGET_DIR RUSTC=/usr/bin/rustc CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
-cargo build --release --quiet --target $target --no-default-features --features cli --bin visavis
+cargo build --release --quiet --target $target -p visavis-tools
 # Voices and user of the sample conversation come from here, as in every run without files.
 qemu-aarch64-static -cpu "${QEMU_CPU:-max}" -L "$ARM64" "$CARGO_TARGET_DIR/$target/release/visavis" \
   report --reference "$reference" --candidate "${candidates[@]}" --blocks "${BLOCKS:-12}" --numerics-only "$out"

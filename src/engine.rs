@@ -1,5 +1,8 @@
 //! The engine: a loaded bundle, immutable, shared by any number of sessions.
 
+#[cfg(feature = "internals")]
+mod round_trip;
+
 use crate::audio::{AudioEncoder, AudioWeights};
 use crate::bundle::{AudioSource, BundleFile, LoadMode, Tensors};
 use crate::config::Config;
@@ -7,8 +10,7 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::flow::{ConditionLayout, FlowNet, Nets, reference_times, student_times};
 use crate::frame::{BLOCK_FRAMES, Sampler};
 use crate::kernels::{Exec, Kernels, KvDtype, Limits};
-use crate::pose::feature_count;
-use crate::session::{Session, SessionOptions, Team};
+use crate::pose::{Rig, feature_count};
 use crate::vae::{Decoder, Encoder};
 use std::path::Path;
 use std::sync::Arc;
@@ -27,10 +29,10 @@ pub struct Networks {
     pub reference: bool,
     /// The student of the single-step sampler, where the bundle has one.
     pub student: bool,
-    /// The encoder of motion. Without it sessions do not re-anchor, whatever [`crate::session::Anchoring`] says.
+    /// The encoder of motion. Without it sessions do not re-anchor, whatever their options say.
     pub encoder: bool,
     /// The weights that make the modulation of any flow time, a fifth of a flow network. Without them sessions have the bundle's own flow times:
-    /// [`Sampler::Midpoint`], [`Sampler::Euler`] with 1, 2, 4 or 8 steps, [`Sampler::Single`], and [`crate::session::HistoryTime::Bundle`].
+    /// [`Sampler::Midpoint`], [`Sampler::Euler`] with 1, 2, 4 or 8 steps, and [`Sampler::Single`].
     pub modulation: bool,
 }
 
@@ -42,16 +44,15 @@ impl Default for Networks {
 }
 
 /// A loaded model: networks packed for this CPU, rig and statistics. Immutable and shared; all that changes is in
-/// [`Session`].
+/// [`Session`](crate::Session).
 ///
 /// ```no_run
-/// # fn main() -> visavis::error::Result<()> {
-/// use visavis::engine::Engine;
-/// use visavis::session::SessionOptions;
+/// # fn main() -> visavis::Result<()> {
+/// use visavis::{Engine, SessionOptions};
 ///
 /// let engine = Engine::load("models/visavis-base-i8.safetensors")?;
 /// let mut session = engine.session(SessionOptions::default())?;
-/// session.push_user_head(glam::Vec3::new(0.0, 1.6, 1.5), 0.0)?;
+/// session.push_user_head(visavis::glam::Vec3::new(0.0, 1.6, 1.5), 0.0)?;
 /// while let Some(frames) = session.poll(0.0)? {
 ///     println!("{} joints at {} s", frames[0].global.len(), frames[0].time);
 /// }
@@ -116,28 +117,15 @@ impl Engine {
         Self::from_file(&BundleFile::from_slice(bytes, name), Kernels::detect()?)
     }
 
-    /// Loads an opened bundle for the given kernels.
-    ///
-    /// # Errors
-    /// As [`Engine::load`].
-    pub fn from_file(file: &BundleFile<'_>, kernels: Kernels) -> Result<Arc<Self>> {
-        Self::from_file_with(file, kernels, Networks::default())
-    }
-
-    /// As [`Engine::from_file`], some networks only. The others' tensors are not read, so not checked.
+    /// Loads some networks of an opened bundle. The others' tensors are not read, so not checked.
     ///
     /// ```no_run
-    /// # fn main() -> visavis::error::Result<()> {
-    /// use visavis::bundle::BundleFile;
-    /// use visavis::engine::{Engine, Networks};
-    /// use visavis::frame::Sampler;
-    /// use visavis::kernels::Kernels;
-    /// use visavis::session::SessionOptions;
+    /// use visavis::{BundleFile, Engine, Networks, Sampler, SessionOptions};
     ///
+    /// # fn main() -> visavis::Result<()> {
     /// // A headset that only ever makes a single step.
     /// let small = Networks { reference: false, encoder: false, modulation: false, ..Networks::default() };
-    /// let file = BundleFile::open("models/visavis-base-i8.safetensors")?;
-    /// let engine = Engine::from_file_with(&file, Kernels::detect()?, small)?;
+    /// let engine = Engine::from_bundle(&BundleFile::open("models/visavis-base-i8.safetensors")?, small)?;
     /// let session = engine.session(SessionOptions { sampler: Sampler::Single, ..SessionOptions::default() })?;
     /// # Ok(())
     /// # }
@@ -145,19 +133,37 @@ impl Engine {
     ///
     /// # Errors
     /// As [`Engine::load`]; [`ErrorKind::Argument`] when neither the reference network nor a student is left.
+    pub fn from_bundle(file: &BundleFile<'_>, networks: Networks) -> Result<Arc<Self>> {
+        Self::from_file_with(file, Kernels::detect()?, networks)
+    }
+
+    /// Loads all of an opened bundle for the given kernels.
+    ///
+    /// # Errors
+    /// As [`Engine::load`].
+    #[doc(hidden)]
+    pub fn from_file(file: &BundleFile<'_>, kernels: Kernels) -> Result<Arc<Self>> {
+        Self::from_file_with(file, kernels, Networks::default())
+    }
+
+    /// As [`Engine::from_bundle`], for the given kernels.
+    ///
+    /// # Errors
+    /// As [`Engine::from_bundle`].
+    #[doc(hidden)]
     pub fn from_file_with(file: &BundleFile<'_>, kernels: Kernels, networks: Networks) -> Result<Arc<Self>> {
         let (config, tensors) = file.parse()?;
         let engine = Self::build(config, &tensors, kernels, networks).map_err(|e| e.with_path(file.path()))?;
         Ok(Arc::new(engine))
     }
 
-    /// An engine of given tensors; [`Engine::from_file`] is the way for bundles.
-    pub(crate) fn from_tensors(
-        config: Config,
-        t: &Tensors<'_>,
-        kernels: Kernels,
-        networks: Networks,
-    ) -> Result<Arc<Self>> {
+    /// An engine of given tensors; [`Engine::from_bundle`] is the way for bundles.
+    ///
+    /// # Errors
+    /// As [`Engine::from_bundle`].
+    #[cfg(feature = "internals")]
+    #[doc(hidden)]
+    pub fn from_tensors(config: Config, t: &Tensors<'_>, kernels: Kernels, networks: Networks) -> Result<Arc<Self>> {
         Self::build(config, t, kernels, networks).map(Arc::new)
     }
 
@@ -249,33 +255,45 @@ impl Engine {
         self.encoder.as_ref().ok_or_else(missing)
     }
 
-    /// Starts a session; all memory that it will need is taken here.
-    ///
-    /// # Errors
-    /// [`ErrorKind::Argument`] when an option is out of range or the bundle cannot do it.
-    pub fn session(self: &Arc<Self>, options: SessionOptions) -> Result<Session> {
-        Session::new(Arc::clone(self), options)
+    /// The model's name, as its bundle tells it.
+    pub fn name(&self) -> &str {
+        &self.config.name
     }
 
-    /// What it takes to step several sessions of this engine together, on `threads` threads (1 or 2): [`Team`] tells how.
-    ///
-    /// # Errors
-    /// [`ErrorKind::Argument`] for another number of threads; [`ErrorKind::Io`] when the second one cannot be started.
-    pub fn team(self: &Arc<Self>, threads: usize) -> Result<Team> {
-        Team::new(Arc::clone(self), threads)
+    /// The licence of the weights, with the acknowledgements that their data asks for.
+    pub fn licence(&self) -> &str {
+        &self.config.licence
+    }
+
+    /// The skeleton of all frames.
+    pub fn rig(&self) -> &Rig {
+        &self.config.rig
+    }
+
+    /// Whether the single-step student was loaded, which [`Sampler::Single`] needs.
+    pub fn has_student(&self) -> bool {
+        self.student.is_some()
+    }
+
+    /// The CPU level that the weights are packed for, as `VISAVIS_CPU` names it: `avx512`, `dotprod`, ...
+    pub fn cpu_level(&self) -> &'static str {
+        self.kernels.level().name()
     }
 
     /// The bundle's configuration.
+    #[doc(hidden)]
     pub fn config(&self) -> &Config {
         &self.config
     }
 
     /// The kernels that its weights are packed for.
+    #[doc(hidden)]
     pub fn kernels(&self) -> Kernels {
         self.kernels
     }
 
     /// Blocks of the idle clip, which are the first tokens of every session.
+    #[doc(hidden)]
     pub fn idle_blocks(&self) -> usize {
         self.idle.len() / self.latent.mean.len()
     }

@@ -3,8 +3,8 @@
 mod common;
 
 use common::{Inputs, motion, poll_blocks, run, tiny};
-use visavis::frame::Frame;
-use visavis::session::{Anchoring, Probe, SessionOptions};
+use visavis::internals::session::{Anchoring, Probe};
+use visavis::{Frame, SessionOptions};
 
 /// Largest step of any joint from one frame to the next, metres.
 fn largest_step(frames: &[Frame]) -> f32 {
@@ -87,7 +87,7 @@ fn re_anchoring_takes_effect_when_it_says() {
 fn start_moves_the_whole_scene() {
     let inputs = Inputs::circling(common::block_seconds(20), 24_000);
     let base = motion(SessionOptions::default(), &inputs, 20);
-    let start = visavis::frame::Root { x: 40.0, z: -25.0, yaw: 2.0 };
+    let start = visavis::Root { x: 40.0, z: -25.0, yaw: 2.0 };
     let mut moved_inputs = inputs.clone();
     moved_inputs.path.iter_mut().for_each(|(_, p)| *p = start.to_world(*p));
     let moved = motion(SessionOptions { start, ..Default::default() }, &moved_inputs, 20);
@@ -102,7 +102,7 @@ fn start_moves_the_whole_scene() {
 /// A pinned sampler may rest for longer than a window and come back.
 #[test]
 fn long_rest_of_a_sampler() {
-    use visavis::frame::Sampler;
+    use visavis::Sampler;
     let inputs = Inputs::circling(common::block_seconds(70), 24_000);
     let mut session = tiny().session(SessionOptions::default()).unwrap();
     run(&mut session, &inputs, 5);

@@ -4,12 +4,8 @@ mod common;
 
 use common::{Inputs, golden_path, run, tiny};
 use std::sync::Arc;
-use visavis::bundle::BundleFile;
-use visavis::config::{GazeConfig, GazeCurve};
-use visavis::engine::Engine;
-use visavis::error::ErrorKind;
-use visavis::frame::{Frame, Sampler};
-use visavis::session::{GazeControl, SessionOptions};
+use visavis::internals::config::{GazeConfig, GazeCurve};
+use visavis::{BundleFile, Engine, ErrorKind, Frame, GazeControl, Sampler, SessionOptions};
 
 const BLOCKS: usize = 12;
 
@@ -23,7 +19,7 @@ fn gaze() -> GazeConfig {
     }
 }
 
-fn with(gaze: &GazeConfig) -> visavis::error::Result<Arc<Engine>> {
+fn with(gaze: &GazeConfig) -> visavis::Result<Arc<Engine>> {
     let bytes = BundleFile::open(golden_path("tiny.safetensors"))?.with_gaze(gaze)?;
     Engine::from_bytes(bytes, "calibrated")
 }

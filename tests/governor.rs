@@ -3,9 +3,8 @@
 mod common;
 
 use common::{Inputs, poll_blocks, run, tiny};
-use visavis::error::ErrorKind;
-use visavis::frame::{Frame, Sampler};
-use visavis::session::{Anchoring, Budget, Governor, Hold, Session, SessionOptions};
+use visavis::internals::session::Anchoring;
+use visavis::{Budget, ErrorKind, Frame, Governor, Hold, Sampler, Session, SessionOptions};
 
 /// Milliseconds of the last block on a device that is `slow` times slower than one that does eight evaluations in 40 ms.
 fn clock(session: &Session, slow: f64) -> f64 {

@@ -11,8 +11,8 @@ use common::tiny;
 use glam::Vec3;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicIsize, Ordering};
-use visavis::frame::Sampler;
-use visavis::session::{Anchoring, SessionOptions};
+use visavis::internals::session::Anchoring;
+use visavis::{Sampler, SessionOptions};
 
 /// The system's allocator, counting bytes that are in use.
 struct Counting;

@@ -3,9 +3,9 @@
 mod common;
 
 use common::{Inputs, poll_blocks, tiny};
-use visavis::frame::{BLOCK_FRAMES, FPS, Frame, Sampler};
-use visavis::nn::PERIOD;
-use visavis::session::{Anchoring, Session, SessionOptions};
+use visavis::internals::nn::PERIOD;
+use visavis::internals::session::Anchoring;
+use visavis::{BLOCK_FRAMES, FPS, Frame, Sampler, Session, SessionOptions};
 
 const DAY: u64 = 24 * 3600 * FPS as u64 / BLOCK_FRAMES as u64;
 const BLOCKS: usize = 60;
@@ -85,5 +85,5 @@ fn a_day_later_counters_go_on() {
     assert_ne!(late[40].global, early[40].global, "other tokens, other noise");
     assert!(late.iter().flat_map(|f| &f.global).all(|t| t.position.is_finite()));
     let kind = tiny().session(SessionOptions { first_block: 1 << 40, ..Default::default() }).unwrap_err().kind();
-    assert_eq!(kind, visavis::error::ErrorKind::Argument);
+    assert_eq!(kind, visavis::ErrorKind::Argument);
 }

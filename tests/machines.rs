@@ -8,12 +8,10 @@ mod common;
 
 use common::{Inputs, block_seconds, golden_path, run};
 use std::fmt::Write;
-use visavis::audio::resample_to_24k;
-use visavis::bundle::BundleFile;
-use visavis::engine::Engine;
-use visavis::frame::{Frame, Sampler};
-use visavis::kernels::{Kernels, KvDtype};
-use visavis::session::{Anchoring, SessionOptions};
+use visavis::internals::audio::resample_to_24k;
+use visavis::internals::kernels::{Kernels, KvDtype};
+use visavis::internals::session::Anchoring;
+use visavis::{BundleFile, Engine, Frame, Sampler, SessionOptions};
 
 const BLOCKS: usize = 24;
 

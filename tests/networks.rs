@@ -4,16 +4,13 @@ mod common;
 
 use common::{golden_path, tiny};
 use std::sync::Arc;
-use visavis::bundle::BundleFile;
-use visavis::config::CleanHistory;
-use visavis::engine::{Engine, Networks};
-use visavis::error::ErrorKind;
-use visavis::frame::Sampler;
-use visavis::kernels::{Kernels, Scheme};
-use visavis::quant::{Options, quantise};
-use visavis::session::{Anchoring, HistoryTime, SessionOptions};
+use visavis::internals::config::CleanHistory;
+use visavis::internals::kernels::{Kernels, Scheme};
+use visavis::internals::quant::{Options, quantise};
+use visavis::internals::session::{Anchoring, HistoryTime};
+use visavis::{BundleFile, Engine, ErrorKind, Networks, Sampler, SessionOptions};
 
-fn load(networks: Networks) -> visavis::error::Result<Arc<Engine>> {
+fn load(networks: Networks) -> visavis::Result<Arc<Engine>> {
     let file = BundleFile::open(golden_path("tiny.safetensors")).expect("the tiny bundle opens");
     Engine::from_file_with(&file, Kernels::detect().expect("kernels"), networks)
 }

@@ -7,10 +7,10 @@ mod common;
 
 use common::{Golden, max_error, tiny};
 use std::collections::BTreeMap;
-use visavis::config::CleanHistory;
-use visavis::frame::{FPS, Sampler};
-use visavis::kernels::KvDtype;
-use visavis::session::{Anchoring, HistoryTime, Probe, SessionOptions};
+use visavis::internals::config::CleanHistory;
+use visavis::internals::kernels::KvDtype;
+use visavis::internals::session::{Anchoring, HistoryTime, Probe};
+use visavis::{FPS, Sampler, SessionOptions};
 
 const TOLERANCE: f32 = 1e-4;
 

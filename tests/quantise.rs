@@ -1,20 +1,12 @@
 //! Quantised bundles: made alike every time, loaded with checks, and close to what they were made from.
 
-#[cfg(feature = "cli")]
-#[path = "common/cli.rs"]
-mod cli;
 mod common;
 
 use common::{Inputs, golden_path, motion_of, tiny_f32, tiny_in};
-use visavis::bundle::{BundleFile, Contents, int16_activations};
-use visavis::engine::Engine;
-use visavis::error::ErrorKind;
-use visavis::frame::Sampler;
-use visavis::kernels::{Kernels, Scheme};
-use visavis::offline::Conversation;
-use visavis::quant::{Budget, Keep, Options, Scene, Teacher, quantise};
-use visavis::session::SessionOptions;
-use visavis::user::UserPath;
+use visavis::internals::bundle::{Contents, int16_activations};
+use visavis::internals::kernels::{Kernels, Scheme};
+use visavis::internals::quant::{Budget, Keep, Options, Scene, Teacher, quantise};
+use visavis::{BundleFile, Engine, ErrorKind, Sampler, SessionOptions};
 
 fn options(scheme: Scheme, keep: &[Keep]) -> Options<'_> {
     Options { scheme, smallest: 0, keep, calibration: None, budget: None }
@@ -22,10 +14,9 @@ fn options(scheme: Scheme, keep: &[Keep]) -> Options<'_> {
 
 fn scene(blocks: usize) -> Scene {
     let inputs = Inputs::circling(4.0, 24_000);
-    let rows: String = inputs.path.iter().map(|(t, p)| format!("{t},{},{},{}\n", p.x, p.y, p.z)).collect();
-    let path = UserPath::parse(&format!("t,x,y,z\n{rows}")).unwrap();
-    Scene::new(&Conversation::new(Some(inputs.agent), Some(inputs.user), Some(path)).unwrap(), blocks, Some(0.5))
-        .unwrap()
+    // 90 positions a second, 30 frames.
+    let heads: Vec<_> = inputs.path.iter().step_by(3).map(|(_, p)| Some(*p)).take(4 * blocks).collect();
+    Scene::new(&inputs.agent, &inputs.user, &heads, Some(0.5)).unwrap()
 }
 
 #[test]
@@ -70,7 +61,7 @@ fn calibrated_rounding_loses_less() {
         let teacher = Teacher::new(&reference, scene(20), Sampler::Midpoint(4), 5, &mut None).unwrap();
         let latents = |bytes: Vec<u8>| {
             let forced = teacher.compare(&Engine::from_bytes(bytes, "tiny").unwrap()).unwrap();
-            visavis::quant::sqnr_db(&forced.latents[0], &forced.latents[1])
+            visavis::internals::quant::sqnr_db(&forced.latents[0], &forced.latents[1])
         };
         let (plain, calibrated) = (latents(plain.bytes), latents(calibrated.bytes));
         println!("{scheme}: latents {plain:.2} dB, calibrated {calibrated:.2} dB");
@@ -203,7 +194,7 @@ fn a_bundle_of_halves_is_half_a_bundle() {
     let keep = ["flow.layers.0.fc1=f32".parse().unwrap()];
     let contents = |file: &BundleFile<'_>| Contents::of(file).unwrap().tensors;
     let before = contents(&file);
-    let bytes = |tensors: &[visavis::bundle::TensorInfo]| tensors.iter().map(|t| t.bytes).sum::<usize>();
+    let bytes = |tensors: &[visavis::internals::bundle::TensorInfo]| tensors.iter().map(|t| t.bytes).sum::<usize>();
     let halves = quantise(&file, &Options { smallest: 8192, ..options(Scheme::F16, &[]) }).unwrap().bytes;
     let halves = contents(&BundleFile::from_bytes(halves, "halves"));
     assert!(2 * bytes(&halves) <= bytes(&before), "{} of {}", bytes(&halves), bytes(&before));
@@ -264,26 +255,4 @@ fn a_budget_raises_layers_until_blocks_are_within_it() {
         "{:?}",
         none.schemes
     );
-}
-
-#[cfg(feature = "cli")]
-#[test]
-fn the_command_writes_whole_files_only() {
-    use cli::{Scratch, fails, names, succeeds};
-    let dir = Scratch::new("quantise");
-    let tiny = golden_path("tiny.safetensors");
-    let tiny = tiny.to_str().unwrap();
-    let out = dir.path("i8.safetensors");
-    let text = succeeds(&["quantize", tiny, out.to_str().unwrap(), "--scheme", "i8", "--keep", "*.fc1=f32"]);
-    assert!(text.contains("MB"), "{text}");
-    assert!(succeeds(&["inspect", out.to_str().unwrap()]).contains("quantised to i8"));
-
-    let again = dir.path("again.safetensors");
-    fails(1, &["quantize", out.to_str().unwrap(), again.to_str().unwrap(), "--scheme", "i8"]);
-    fails(1, &["quantize", out.to_str().unwrap(), out.to_str().unwrap(), "--scheme", "i4"]);
-    fails(1, &["quantize", "no/such.safetensors", again.to_str().unwrap(), "--scheme", "i8"]);
-    fails(2, &["quantize", tiny, again.to_str().unwrap(), "--scheme", "i3"]);
-    fails(2, &["quantize", tiny, again.to_str().unwrap(), "--scheme", "i8", "--auto", "-1"]);
-    fails(1, &["quantize", tiny, dir.path("no/folder/x").to_str().unwrap(), "--scheme", "i8"]);
-    assert_eq!(names(dir.path("i8.safetensors").parent().unwrap()), ["i8.safetensors"]);
 }

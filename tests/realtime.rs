@@ -7,9 +7,9 @@ mod common;
 use common::{Inputs, tiny, tiny_in};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use visavis::frame::Sampler;
-use visavis::kernels::Scheme;
-use visavis::session::{Anchoring, Budget, Governor, Hold, SessionOptions};
+use visavis::internals::kernels::Scheme;
+use visavis::internals::session::Anchoring;
+use visavis::{Budget, Governor, Hold, Sampler, SessionOptions};
 
 /// The system's allocator, counting what is asked of it while `WATCH` is set.
 struct Counting;

@@ -29,7 +29,7 @@ export RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=$kind"
 export CARGO_PROFILE_TEST_DEBUG=line-tables-only
 export RTSAN_OPTIONS="suppressions=$PWD/tests/rtsan.supp"
 export ASAN_OPTIONS=detect_leaks=1:abort_on_error=0 TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp halt_on_error=1"
-cargo=(cargo test --quiet --target "$host" --target-dir "target/sanitize/$kind" --no-default-features --features cli)
+cargo=(cargo test --quiet --target "$host" --target-dir "target/sanitize/$kind" -p visavis)
 case $kind in
 address)
   parts=(kernels:: par::)

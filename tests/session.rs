@@ -4,9 +4,7 @@ mod common;
 
 use common::{Inputs, motion, poll_blocks, run, tiny};
 use glam::Vec3;
-use visavis::error::ErrorKind;
-use visavis::frame::{BLOCK_FRAMES, FPS, Frame, Sampler};
-use visavis::session::{Session, SessionOptions};
+use visavis::{BLOCK_FRAMES, ErrorKind, FPS, Frame, Sampler, Session, SessionOptions};
 
 const BLOCKS: usize = 30;
 

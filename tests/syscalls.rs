@@ -11,8 +11,7 @@
 mod common;
 
 use common::{Inputs, tiny};
-use visavis::frame::Sampler;
-use visavis::session::{Budget, Governor, Session, SessionOptions};
+use visavis::{Budget, Governor, Sampler, Session, SessionOptions};
 
 /// What became of a child that ran `work` under the filter.
 #[derive(Debug, PartialEq)]

@@ -4,11 +4,9 @@ mod common;
 
 use common::{Inputs, tiny, tiny_in};
 use std::sync::Arc;
-use visavis::engine::Engine;
-use visavis::error::ErrorKind;
-use visavis::frame::{Frame, Sampler};
-use visavis::kernels::Scheme;
-use visavis::session::{Anchoring, Budget, Governor, Session, SessionOptions};
+use visavis::internals::kernels::Scheme;
+use visavis::internals::session::Anchoring;
+use visavis::{Budget, Engine, ErrorKind, Frame, Governor, Sampler, Session, SessionOptions};
 
 const BLOCKS: usize = 60;
 

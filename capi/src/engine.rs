@@ -4,8 +4,8 @@ use crate::status::{Failure, Outcome, VisavisStatus, guard};
 use crate::structs::{borrow, place, slice};
 use std::ffi::{CStr, CString, c_char};
 use std::sync::Arc;
-use visavis::engine::Engine;
-use visavis::pose::openxr::{FB_BODY_JOINTS, OPENXR_JOINTS, openxr_joint};
+use visavis::Engine;
+use visavis::openxr::{FB_BODY_JOINTS, OPENXR_JOINTS, openxr_joint};
 
 /// A loaded bundle: immutable, shared by any number of sessions.
 pub struct VisavisEngine {
@@ -27,8 +27,7 @@ pub enum VisavisBody {
 impl VisavisEngine {
     fn new(engine: Arc<Engine>) -> Box<Self> {
         let text = |s: &str| CString::new(s.replace('\0', "?")).unwrap_or_default();
-        let config = engine.config();
-        let (name, joints) = (text(&config.name), config.rig.joints.iter().map(|j| text(&j.name)).collect());
+        let (name, joints) = (text(engine.name()), engine.rig().joints.iter().map(|j| text(&j.name)).collect());
         Box::new(Self { engine, name, joints })
     }
 
@@ -81,7 +80,7 @@ pub unsafe extern "C" fn visavis_engine_from_fd(
         #[cfg(unix)]
         {
             use std::os::fd::BorrowedFd;
-            use visavis::{bundle::BundleFile, kernels::Kernels};
+            use visavis::{BundleFile, Networks};
             if fd < 0 {
                 return Err(Failure::argument(format!("file descriptor {fd}")));
             }
@@ -89,10 +88,10 @@ pub unsafe extern "C" fn visavis_engine_from_fd(
             // duplication fail.
             let borrowed = unsafe { BorrowedFd::borrow_raw(fd) };
             let name = format!("file descriptor {fd}");
-            let io = |e| visavis::error::Error::io("duplicate the descriptor", &name, e);
+            let io = |e| visavis::Error::io("duplicate the descriptor", &name, e);
             let file = std::fs::File::from(borrowed.try_clone_to_owned().map_err(io)?);
             let part = BundleFile::open_part(&file, offset, (length > 0).then_some(length), &name)?;
-            Ok(Engine::from_file(&part, Kernels::detect()?)?)
+            Ok(Engine::from_bundle(&part, Networks::default())?)
         }
         #[cfg(not(unix))]
         {
@@ -165,7 +164,7 @@ pub unsafe extern "C" fn visavis_engine_joint(
     guard(|| {
         // SAFETY: the header's promise.
         let engine = unsafe { borrow(engine, "engine") }?;
-        let of = &engine.engine.config().rig.joints[engine.joint(joint)?];
+        let of = &engine.engine.rig().joints[engine.joint(joint)?];
         if !parent.is_null() {
             // SAFETY: the header's promise.
             unsafe { place(parent, "parent") }?.write(of.parent.map_or(-1, |p| p as i32));
@@ -184,7 +183,7 @@ pub unsafe extern "C" fn visavis_engine_openxr_joint(engine: *const VisavisEngin
     // SAFETY: the header's promise.
     let Ok(engine) = (unsafe { borrow(engine, "engine") }) else { return -1 };
     let count = if body == VisavisBody::Fb as i32 { FB_BODY_JOINTS } else { OPENXR_JOINTS.len() };
-    let joints = &engine.engine.config().rig.joints;
+    let joints = &engine.engine.rig().joints;
     let index = joints.get(joint as usize).and_then(|j| openxr_joint(&j.name)).filter(|&i| i < count);
     index.map_or(-1, |i| i as i32)
 }
@@ -196,5 +195,5 @@ pub unsafe extern "C" fn visavis_engine_joint_for_openxr(engine: *const VisavisE
     // SAFETY: the header's promise.
     let Ok(engine) = (unsafe { borrow(engine, "engine") }) else { return -1 };
     let follows = OPENXR_JOINTS.get(openxr_joint as usize).and_then(|j| j.1);
-    follows.and_then(|name| engine.engine.config().rig.index(name)).map_or(-1, |i| i as i32)
+    follows.and_then(|name| engine.engine.rig().index(name)).map_or(-1, |i| i as i32)
 }

@@ -1,7 +1,7 @@
 //! Frames as C sees them.
 
 use crate::options::sampler_numbers;
-use visavis::frame::Frame;
+use visavis::Frame;
 
 /// One frame of motion, without its joints. World coordinates: metres, right-handed, Y up.
 #[repr(C)]

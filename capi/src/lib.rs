@@ -28,7 +28,7 @@ pub const VISAVIS_ABI_VERSION: u32 = 1 << 16;
 
 /// Frames that a poll gives when a block is due.
 pub const VISAVIS_BLOCK_FRAMES: usize = 4;
-const _: () = assert!(VISAVIS_BLOCK_FRAMES == visavis::frame::BLOCK_FRAMES);
+const _: () = assert!(VISAVIS_BLOCK_FRAMES == visavis::BLOCK_FRAMES);
 
 /// Version of the interface that the library has.
 #[unsafe(no_mangle)]

@@ -2,8 +2,7 @@
 
 use crate::status::{Failure, Outcome, VisavisStatus, guard};
 use crate::structs::{Sized32, check, sized_struct};
-use visavis::frame::{Root, Sampler};
-use visavis::session::{Budget, Governor, SessionOptions};
+use visavis::{Budget, Governor, Root, Sampler, SessionOptions};
 
 /// How a block is made: evaluations of the network against quality.
 #[repr(i32)]

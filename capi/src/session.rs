@@ -7,8 +7,7 @@ use crate::options::{VisavisSessionOptions, governor, sampler};
 use crate::status::{Failure, Outcome, VisavisStatus, guard};
 use crate::structs::{borrow, place, room, slice};
 use std::sync::{Mutex, TryLockError};
-use visavis::audio::Voice;
-use visavis::session::Session;
+use visavis::{Session, Voice};
 
 /// One conversation with one user.
 pub struct VisavisSession {
@@ -238,7 +237,7 @@ pub unsafe extern "C" fn visavis_session_poll(
     let poll = |s: &mut Session| {
         // SAFETY: the header's promise.
         let count = unsafe { place(frame_count, "frame_count") }?.write(0);
-        let per_frame = s.engine().config().rig.joints.len();
+        let per_frame = s.engine().rig().joints.len();
         let all = VISAVIS_BLOCK_FRAMES * per_frame;
         if joint_capacity < all && !(joints.is_null() && joint_capacity == 0) {
             return Err(Failure::argument(format!("joint_capacity is {joint_capacity}: a block has {all} joints")));

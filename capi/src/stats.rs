@@ -3,8 +3,7 @@
 use crate::session::{VisavisSession, with};
 use crate::status::VisavisStatus;
 use crate::structs::{Sized32, sized_struct};
-use visavis::audio::VoiceStats;
-use visavis::session::SessionStats;
+use visavis::stats::{SessionStats, VoiceStats};
 
 /// Counters of a voice, 24 kHz samples unless said otherwise.
 #[repr(C)]

@@ -4,7 +4,7 @@ use std::any::Any;
 use std::cell::RefCell;
 use std::ffi::{CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use visavis::error::{Error, ErrorKind};
+use visavis::{Error, ErrorKind};
 
 /// What became of a call.
 #[repr(i32)]

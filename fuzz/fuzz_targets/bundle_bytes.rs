@@ -2,10 +2,8 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use visavis::bundle::{BundleFile, Contents};
-use visavis::engine::Engine;
-use visavis::frame::Sampler;
-use visavis::session::SessionOptions;
+use visavis::{BundleFile, Engine, Sampler, SessionOptions};
+use visavis::internals::bundle::Contents;
 use visavis_fuzz::seed_small;
 
 fuzz_target!(init: seed_small(), |data: &[u8]| {

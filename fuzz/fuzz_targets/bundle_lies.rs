@@ -6,10 +6,8 @@ use arbitrary::{Arbitrary, Unstructured};
 use libfuzzer_sys::fuzz_target;
 use safetensors::Dtype;
 use std::sync::OnceLock;
-use visavis::bundle::CONFIG_KEY;
-use visavis::engine::Engine;
-use visavis::frame::Sampler;
-use visavis::session::SessionOptions;
+use visavis::internals::bundle::CONFIG_KEY;
+use visavis::{Engine, Sampler, SessionOptions};
 use visavis_fuzz::small;
 
 /// Numbers that break things.

@@ -2,9 +2,9 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use visavis::error::ErrorKind;
-use visavis::offline::{Conversation, for_session};
-use visavis::user::UserPath;
+use visavis::ErrorKind;
+use visavis_tools::offline::{Conversation, for_session};
+use visavis_tools::offline::UserPath;
 
 fuzz_target!(|data: &[u8]| {
     let Ok(text) = std::str::from_utf8(data) else { return };

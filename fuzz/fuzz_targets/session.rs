@@ -6,9 +6,8 @@ use arbitrary::{Arbitrary, Unstructured};
 use glam::Vec3;
 use libfuzzer_sys::fuzz_target;
 use std::cell::RefCell;
-use visavis::error::ErrorKind;
-use visavis::frame::{Root, Sampler};
-use visavis::session::{Anchoring, Budget, Governor, Session, SessionOptions};
+use visavis::{Budget, ErrorKind, Governor, Root, Sampler, Session, SessionOptions};
+use visavis::internals::session::Anchoring;
 use visavis_fuzz::{engine, student};
 
 thread_local! {
@@ -121,7 +120,7 @@ fn drive(session: &mut Session, u: &mut Unstructured) {
 /// Takes a step; returns the number of blocks that were computed.
 fn take(session: &mut Session, step: Step, next: &mut Option<u64>) -> u32 {
     let mut sound = [0.0f32; 4096];
-    let typed = |result: visavis::error::Result<()>| {
+    let typed = |result: visavis::Result<()>| {
         if let Err(e) = result {
             assert!(matches!(e.kind(), ErrorKind::Argument | ErrorKind::Audio), "{e}");
         }

@@ -2,8 +2,8 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use visavis::audio::Wav;
-use visavis::error::ErrorKind;
+use visavis_tools::offline::Wav;
+use visavis::ErrorKind;
 
 fuzz_target!(|data: &[u8]| match Wav::parse(data) {
     Ok(wav) => {

@@ -1,9 +1,8 @@
-//! Voices: from sound files and pushed samples to one feature vector a frame.
+//! Voices: from pushed samples to one feature vector per frame.
 //!
 //! ```text
-//! file: Wav ──┐
-//!             ├─> Voice (Resampler, ring on the session's time line) ──> AudioEncoder ──> D_a features a frame
-//! push: f32 ──┘   any rate and size in, 3200 samples a block out         on our kernels, or TractEncoder
+//! push: f32 ──> Voice (Resampler, ring on the session's time line) ──> AudioEncoder ──> D_a features per frame
+//!               any rate and size in, 3200 samples per block out       on our kernels, or TractEncoder
 //! ```
 
 mod encoder;
@@ -12,15 +11,13 @@ mod ring;
 #[cfg(feature = "tract")]
 mod tract;
 mod voice;
-mod wav;
 mod weights;
 
 pub use encoder::AudioEncoder;
-pub use resample::{MAX_RATE, MIN_RATE, Resampler, resample_to_24k};
+pub use resample::{MAX_RATE, MIN_RATE, Resampler, check_rate, resample_to_24k};
 #[cfg(feature = "tract")]
 pub use tract::TractEncoder;
 pub use voice::{VOICE_SECONDS, Voice, VoiceStats};
-pub use wav::Wav;
 pub use weights::{AudioWeights, LayerWeights, check_audio_config};
 
 /// What computes the audio encoder.

@@ -37,7 +37,7 @@ const WINDOW: WindowFunction = WindowFunction::BlackmanHarris;
 const STEPS: f64 = (1 << 20) as f64;
 
 /// Refuses rates outside [`MIN_RATE`] to [`MAX_RATE`].
-pub(crate) fn check_rate(rate: u32) -> Result<()> {
+pub fn check_rate(rate: u32) -> Result<()> {
     if (MIN_RATE..=MAX_RATE).contains(&rate) {
         return Ok(());
     }

@@ -209,20 +209,3 @@ proptest! {
         prop_assert_eq!(live.stats().underrun_samples, 0);
     }
 }
-
-#[test]
-fn the_sample_conversation_is_usable() {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("samples");
-    let path = crate::user::UserPath::read(folder.join("user.csv")).unwrap();
-    for voice in ["agent.wav", "user.wav"] {
-        let wav = Wav::read(folder.join(voice)).unwrap();
-        assert_eq!(wav.to_24k().unwrap().len(), 219 * BLOCK_SAMPLES, "{voice}");
-        assert!((wav.seconds() - path.end()).abs() < 0.02);
-        let spoken = wav.samples.iter().filter(|s| s.abs() > 0.02).count();
-        assert!(spoken > wav.samples.len() / 20, "{voice} is silent");
-    }
-    let mut track = crate::user::HeadTrack::new();
-    path.points().iter().for_each(|&(time, position)| track.push(position, time));
-    let stats = track.stats();
-    assert_eq!((stats.accepted, stats.teleports, stats.overwritten), (path.points().len() as u64, 0, 0));
-}

@@ -40,7 +40,7 @@ pub struct Voice {
 }
 
 impl Voice {
-    /// A voice that holds [`VOICE_SECONDS`]; absent until the first push.
+    /// A voice that holds a minute of sound; absent until the first push.
     pub fn new() -> Self {
         Self::with_capacity(VOICE_SECONDS)
     }
@@ -148,8 +148,8 @@ impl Voice {
         self.ring.end()
     }
 
-    /// Samples by which sound is heard later because it was resampled: 0 at 24 kHz, else the largest
-    /// [`Resampler::latency_samples`] of the rates that were pushed.
+    /// Samples (24 kHz) by which sound is heard later because it was resampled: 0 at 24 kHz, else the longest look-ahead
+    /// of the rates that were pushed.
     pub fn lag_samples(&self) -> usize {
         self.lag
     }

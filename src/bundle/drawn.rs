@@ -1,6 +1,6 @@
 //! Tensors that are drawn from their names instead of read: networks of sizes for which there is no bundle, to measure their speed.
 
-use super::{StoredData, StoredWeights};
+use super::{SMALL, StoredData, StoredWeights};
 use crate::engine::IDLE_LATENTS;
 use crate::frame::BLOCK_FRAMES;
 use crate::kernels::{I4_GROUP, Scheme};
@@ -58,7 +58,7 @@ pub(super) fn floats(name: &str, shape: &[usize]) -> Vec<f32> {
 pub(super) fn weights(name: &str, rows: usize, cols: usize, scheme: Scheme) -> StoredWeights {
     let mut source = Source::new(name);
     let scheme = match scheme {
-        Scheme::I8 | Scheme::I4 if rows * cols < crate::quant::SMALL => Scheme::F16,
+        Scheme::I8 | Scheme::I4 if rows * cols < SMALL => Scheme::F16,
         scheme => scheme,
     };
     let data = match scheme {

@@ -17,7 +17,7 @@ pub use audio::AudioSource;
 pub use contents::{Contents, TensorInfo};
 pub use file::{BundleFile, LoadMode};
 pub(crate) use rewrite::{Entry, assemble, entries, failed, floats};
-pub use stored::{StoredData, StoredWeights, int16_activations};
+pub use stored::{SMALL, StoredData, StoredWeights, int16_activations};
 pub use tensors::Tensors;
 
 /// Key of the config in the safetensors metadata.

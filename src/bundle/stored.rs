@@ -3,6 +3,10 @@
 use crate::kernels::{Kernels, Matrix, Scheme, WeightData, Weights};
 use half::f16;
 
+/// Matrices with fewer weights than this stay floats in int8 and int4 bundles, if nothing else is asked for: together they
+/// are less than a hundredth of a bundle.
+pub const SMALL: usize = 8192;
+
 /// Weights of one layer in their scheme: `rows` outputs x `cols` inputs, row-major. Convolutions are flattened after the first axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredWeights {

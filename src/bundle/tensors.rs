@@ -45,13 +45,15 @@ impl<'a> Tensors<'a> {
 
     /// No bundle: every tensor that is asked for is there, drawn from its name, weights of some size in `scheme`. To measure
     /// networks of sizes for which there is no bundle.
-    pub(crate) fn seeded(scheme: Scheme) -> Self {
+    #[cfg(feature = "internals")]
+    pub fn seeded(scheme: Scheme) -> Self {
         let drawn = Some(scheme);
         Self { container: None, file: None, drawn, kept: None, quantisation: None, read: RefCell::default() }
     }
 
     /// As [`Tensors::seeded`], and what has been asked for can be written: [`Tensors::bundle`].
-    pub(crate) fn seeded_and_kept(scheme: Scheme) -> Self {
+    #[cfg(feature = "internals")]
+    pub fn seeded_and_kept(scheme: Scheme) -> Self {
         let record = Quantisation { scheme, tensors: BTreeMap::new() };
         Self { kept: Some(RefCell::new(Kept { entries: Vec::new(), record })), ..Self::seeded(scheme) }
     }
@@ -60,7 +62,8 @@ impl<'a> Tensors<'a> {
     ///
     /// # Errors
     /// [`ErrorKind::BundleInvalid`] when it cannot be written.
-    pub(crate) fn bundle(self, config: &Config) -> Result<Vec<u8>> {
+    #[cfg(feature = "internals")]
+    pub fn bundle(self, config: &Config) -> Result<Vec<u8>> {
         let kept = self.kept.map(RefCell::into_inner).ok_or_else(|| failed("its tensors were not kept"))?;
         let config = Config { quantisation: Some(kept.record), ..config.clone() };
         assemble(&serde_json::to_value(&config).map_err(failed)?, &kept.entries)

@@ -116,7 +116,7 @@ impl Weights<'_> {
     }
 
     /// The values as floats, row-major.
-    pub fn to_f32(&self) -> Vec<f32> {
+    pub fn to_f32(self) -> Vec<f32> {
         let cols = self.cols;
         match self.data {
             WeightData::F32(w) => w.to_vec(),

@@ -17,8 +17,8 @@ pub mod icosahedron;
 pub mod openxr;
 mod rig;
 mod stance;
-#[cfg(test)]
-pub(crate) mod synthetic;
+#[cfg(any(test, feature = "internals"))]
+pub mod synthetic;
 
 pub use features::{Decoder, Encoder, feature_count, root_of};
 pub use fit::Fit;

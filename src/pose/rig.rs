@@ -35,7 +35,7 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// Checks that the rig can be used: 1 to [`MAX_JOINTS`] joints, `hips` first and the only root, parents before
+    /// Checks that the rig can be used: 1 to 256 joints, `hips` first and the only root, parents before
     /// children, unique non-empty names, finite offsets of at most 3 m, a distance between `eyes` and `head_back`, and
     /// the joints `hips`, `head`, both hands and both feet.
     ///

@@ -1,9 +1,19 @@
 //! Procedural motion for tests: somebody who walks in a circle, gestures and looks around.
 
 use super::{Rig, gaze_score, root_of};
-use crate::frame::{FPS, FRAME_SAMPLES, Frame, Transform};
-use crate::recording::Recording;
+use crate::frame::{FPS, Frame, Transform};
 use glam::{Quat, Vec3};
+
+/// Procedural motion.
+#[derive(Debug, Clone)]
+pub struct Walk {
+    /// The reference rig.
+    pub rig: Rig,
+    /// Frames at 30 fps, consecutive.
+    pub frames: Vec<Frame>,
+    /// World position of the user's head at each frame, metres; `None` where unknown.
+    pub user: Vec<Option<Vec3>>,
+}
 
 /// Radius of the circle, metres.
 const CIRCLE: f64 = 2.0;
@@ -12,7 +22,7 @@ const SPEED: f64 = 1.0;
 
 /// `frames` frames of walking on the reference rig; bone lengths exact, `global` = kinematics of `local`. The user walks
 /// ahead and is not seen in frames 0 to 9 and 40 to 49.
-pub(crate) fn walk(frames: usize) -> Recording {
+pub fn walk(frames: usize) -> Walk {
     let rig = Rig::humanoid();
     let user = |i: usize| {
         let a = i as f32 * 0.01;
@@ -20,9 +30,7 @@ pub(crate) fn walk(frames: usize) -> Recording {
     };
     let users: Vec<_> = (0..frames).map(user).collect();
     let frames: Vec<_> = users.iter().enumerate().map(|(i, &user)| frame(&rig, i, user)).collect();
-    let voice = |hz: f32| Some((0..frames.len() * FRAME_SAMPLES).map(|i| 0.3 * (i as f32 * hz).sin()).collect());
-    let (agent_voice, user_voice) = (voice(0.05), voice(0.08));
-    Recording { rig, frames, user: users, agent_voice, user_voice, gaze_target: Some(0.8) }
+    Walk { rig, frames, user: users }
 }
 
 fn frame(rig: &Rig, i: usize, user: Option<Vec3>) -> Frame {
@@ -73,10 +81,11 @@ fn rotation(name: &str, phase: f32, t: f32) -> Quat {
 }
 
 /// Reproducible noise.
-pub(crate) struct Noise(u64);
+pub struct Noise(u64);
 
 impl Noise {
-    pub(crate) fn new(seed: u64) -> Self {
+    /// Noise that depends on `seed` alone.
+    pub fn new(seed: u64) -> Self {
         Self(seed)
     }
 
@@ -90,7 +99,7 @@ impl Noise {
     }
 
     /// Three independent values of mean 0 and standard deviation 1, at most sqrt(12) each (the sum of four uniform ones).
-    pub(crate) fn vector(&mut self) -> Vec3 {
+    pub fn vector(&mut self) -> Vec3 {
         let mut value = || (0..4).map(|_| self.next()).sum::<f32>() * (3.0f32 / 4.0).sqrt();
         Vec3::new(value(), value(), value())
     }

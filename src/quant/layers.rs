@@ -37,9 +37,6 @@ pub fn layers(tensors: &Tensors<'_>) -> Result<Vec<Layer>> {
         .collect()
 }
 
-/// Matrices with fewer weights than this stay floats in int8 and int4 bundles, if nothing else is asked for: together they are less than a hundredth of a bundle.
-pub const SMALL: usize = 8192;
-
 /// Layers of the audio encoder with as many weights as this are worth their int8.
 const LARGE: usize = 150_000;
 

@@ -32,10 +32,11 @@ mod tests;
 mod walker;
 mod write;
 
+pub use crate::bundle::SMALL;
 pub use auto::{Budget, Choice};
 pub use calibration::Calibration;
 pub use keep::Keep;
-pub use layers::{Layer, SMALL, default_scheme, layers};
+pub use layers::{Layer, default_scheme, layers};
 pub use round::{round, sqnr_db};
 pub use scene::Scene;
 pub use teacher::{Forced, FrameError, Teacher};

@@ -2,8 +2,7 @@
 
 use super::argument;
 use crate::error::Result;
-use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES, FPS, Root};
-use crate::offline::Conversation;
+use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES, Root};
 use glam::Vec3;
 
 /// A conversation cut into blocks.
@@ -18,23 +17,28 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// The first `blocks` blocks of `talk` (all of it when it is shorter), with a gaze target or none.
+    /// The whole blocks of `heads`, the user's head at each frame (world metres, `None` where unknown), with both voices
+    /// (24 kHz mono; one that ends before is silent from there), and a gaze target or none.
     ///
     /// # Errors
     /// [`ErrorKind::Argument`](crate::error::ErrorKind::Argument) when there is not a whole block.
-    pub fn new(talk: &Conversation, blocks: usize, gaze: Option<f32>) -> Result<Self> {
-        let blocks = blocks.min(talk.frames() / BLOCK_FRAMES);
+    pub fn new(agent: &[f32], user: &[f32], heads: &[Option<Vec3>], gaze: Option<f32>) -> Result<Self> {
+        let blocks = heads.len() / BLOCK_FRAMES;
         if blocks == 0 {
             return Err(argument("the conversation is shorter than a block of four frames".to_owned()));
         }
-        let voice = |v: Option<&[f32]>| {
-            let mut v = v.unwrap_or_default().to_vec();
+        let voice = |v: &[f32]| {
+            let mut v = v.to_vec();
             v.resize(blocks * BLOCK_SAMPLES, 0.0);
             v
         };
-        let head = |i: usize| talk.path().and_then(|p| p.at(i as f64 / f64::from(FPS)));
-        let heads = (0..blocks * BLOCK_FRAMES).map(head).collect();
-        Ok(Self { agent: voice(talk.agent()), user: voice(talk.user()), heads, blocks, gaze })
+        Ok(Self {
+            agent: voice(agent),
+            user: voice(user),
+            heads: heads[..blocks * BLOCK_FRAMES].to_vec(),
+            blocks,
+            gaze,
+        })
     }
 
     /// The same user and length with the two voices exchanged: a conversation that nothing was chosen by.

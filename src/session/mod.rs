@@ -47,6 +47,24 @@ use governor::{Log, Policy};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+impl Engine {
+    /// Starts a session; all memory that it will need is taken here.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] when an option is out of range or the bundle cannot do it.
+    pub fn session(self: &Arc<Self>, options: SessionOptions) -> Result<Session> {
+        Session::new(Arc::clone(self), options)
+    }
+
+    /// What it takes to step several sessions of this engine together, on `threads` threads (1 or 2): [`Team`] tells how.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] for another number of threads; [`ErrorKind::Io`] when the second one cannot be started.
+    pub fn team(self: &Arc<Self>, threads: usize) -> Result<Team> {
+        Team::new(Arc::clone(self), threads)
+    }
+}
+
 /// All mutable state of one conversation.
 ///
 /// Time is the caller's: seconds since the session started, the same clock for [`Session::push_user_head`] and

@@ -4,10 +4,8 @@ use super::common::golden_path;
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 use std::collections::{BTreeMap, HashMap};
-use visavis::bundle::{BundleFile, CONFIG_KEY, Contents};
-use visavis::engine::Engine;
-use visavis::error::{Error, ErrorKind};
-use visavis::session::SessionOptions;
+use visavis::internals::bundle::{CONFIG_KEY, Contents};
+use visavis::{BundleFile, Engine, Error, ErrorKind, SessionOptions};
 
 pub(super) const NAME: &str = "some/bundle.safetensors";
 
@@ -229,7 +227,7 @@ fn a_bundle_inside_another_file() {
     };
     let (offset, length) = (offset as u64, bytes.len() as u64);
     let whole = open(offset, Some(length)).unwrap();
-    let engine = Engine::from_file(&whole, visavis::kernels::Kernels::detect().unwrap()).unwrap();
+    let engine = Engine::from_file(&whole, visavis::internals::kernels::Kernels::detect().unwrap()).unwrap();
     assert_eq!(engine.config(), Engine::from_slice(&bytes, NAME).unwrap().config());
     assert_eq!(kind(offset, length + 101), ErrorKind::Argument);
     assert_eq!(kind(u64::MAX, 2), ErrorKind::Argument);

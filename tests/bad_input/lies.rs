@@ -4,9 +4,7 @@
 use super::bundle::{NAME, Parts, tiny_bytes};
 use proptest::prelude::*;
 use serde_json::{Map, Value, json};
-use visavis::engine::Engine;
-use visavis::error::ErrorKind;
-use visavis::session::SessionOptions;
+use visavis::{Engine, ErrorKind, SessionOptions};
 
 /// Numbers that break things.
 const EDGES: [u64; 12] =
@@ -142,8 +140,8 @@ fn weights_that_overflow_are_held() {
         parts.f32(name, &shape, 3e38);
         let engine = Engine::from_bytes(parts.bytes(), NAME).expect("finite weights load");
         let mut session = engine.session(SessionOptions::default()).unwrap();
-        let student = visavis::frame::Sampler::Single;
-        for sampler in [visavis::frame::Sampler::Midpoint(4), student] {
+        let student = visavis::Sampler::Single;
+        for sampler in [visavis::Sampler::Midpoint(4), student] {
             session.set_sampler(sampler).unwrap();
             let broken = name.starts_with("vae") || (name.starts_with("student") == (sampler == student));
             let mut held = 0;

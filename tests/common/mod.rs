@@ -4,18 +4,17 @@
 use glam::Vec3;
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use visavis::bundle::BundleFile;
-use visavis::engine::Engine;
-use visavis::frame::{BLOCK_FRAMES, FPS, Frame};
-use visavis::kernels::Scheme;
-use visavis::quant::{Options, quantise};
-use visavis::session::{Session, SessionOptions};
+use visavis::internals::kernels::Scheme;
+use visavis::internals::quant::{Options, quantise};
+use visavis::{BLOCK_FRAMES, BundleFile, Engine, FPS, Frame, Session, SessionOptions};
 
-/// A file of `tests/goldens`.
+/// A file of `tests/goldens`, in the folder of the package that is tested or the one above it.
 pub fn golden_path(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/goldens").join(name)
+    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut folders = package.ancestors().map(|folder| folder.join("tests/goldens"));
+    folders.find(|folder| folder.is_dir()).expect("the folder of goldens").join(name)
 }
 
 /// The tiny bundle: the real networks with few channels and random weights.

@@ -8,10 +8,8 @@ use jni::Env;
 use jni::objects::{JByteArray, JByteBuffer, JClass, JFloatArray, JIntArray, JObjectArray, JString};
 use jni::sys::{jboolean, jint, jlong};
 use std::sync::Arc;
-use visavis::bundle::BundleFile;
-use visavis::engine::Engine;
-use visavis::kernels::Kernels;
-use visavis::pose::openxr::{OPENXR_JOINTS, openxr_joint};
+use visavis::openxr::{OPENXR_JOINTS, openxr_joint};
+use visavis::{BundleFile, Engine, Networks};
 
 pub(crate) static ENGINES: Table<Engine> = Table::new("engine");
 
@@ -44,10 +42,10 @@ fn engine_from_fd<'l>(_: &mut Env<'l>, _: JClass<'l>, fd: jint, offset: jlong, l
     }
     // SAFETY: not -1, and open for the time of this call: Java holds the ParcelFileDescriptor. Duplicating a closed one fails.
     let borrowed = unsafe { std::os::fd::BorrowedFd::borrow_raw(fd) };
-    let io = |e| visavis::error::Error::io("duplicate the descriptor", "file descriptor", e);
+    let io = |e| visavis::Error::io("duplicate the descriptor", "file descriptor", e);
     let file = std::fs::File::from(borrowed.try_clone_to_owned().map_err(io)?);
     let part = BundleFile::open_part(&file, offset, length, "bundle asset")?;
-    Ok(ENGINES.insert(Engine::from_file(&part, Kernels::detect()?)?))
+    Ok(ENGINES.insert(Engine::from_bundle(&part, Networks::default())?))
 }
 
 fn engine_from_buffer<'l>(
@@ -75,21 +73,21 @@ fn engine_close<'l>(_: &mut Env<'l>, _: JClass<'l>, engine: jlong) -> Outcome<jb
 }
 
 fn engine_name<'l>(env: &mut Env<'l>, _: JClass<'l>, engine: jlong) -> Outcome<JString<'l>> {
-    Ok(JString::from_str(env, &ENGINES.get(engine)?.config().name)?)
+    Ok(JString::from_str(env, &ENGINES.get(engine)?.name())?)
 }
 
 fn engine_has_student<'l>(_: &mut Env<'l>, _: JClass<'l>, engine: jlong) -> Outcome<jboolean> {
-    Ok(ENGINES.get(engine)?.config().student.is_some())
+    Ok(ENGINES.get(engine)?.has_student())
 }
 
 fn engine_joint_names<'l>(env: &mut Env<'l>, _: JClass<'l>, engine: jlong) -> Outcome<JObjectArray<'l, JString<'l>>> {
     let engine = ENGINES.get(engine)?;
-    strings(env, engine.config().rig.joints.iter().map(|j| Some(j.name.as_str())).collect())
+    strings(env, engine.rig().joints.iter().map(|j| Some(j.name.as_str())).collect())
 }
 
 fn engine_joint_parents<'l>(env: &mut Env<'l>, _: JClass<'l>, engine: jlong) -> Outcome<JIntArray<'l>> {
     let engine = ENGINES.get(engine)?;
-    let parents: Vec<jint> = engine.config().rig.joints.iter().map(|j| j.parent.map_or(-1, |p| p as jint)).collect();
+    let parents: Vec<jint> = engine.rig().joints.iter().map(|j| j.parent.map_or(-1, |p| p as jint)).collect();
     let array = JIntArray::new(env, parents.len())?;
     array.set_region(env, 0, &parents)?;
     Ok(array)
@@ -97,7 +95,7 @@ fn engine_joint_parents<'l>(env: &mut Env<'l>, _: JClass<'l>, engine: jlong) -> 
 
 fn engine_rest_offsets<'l>(env: &mut Env<'l>, _: JClass<'l>, engine: jlong) -> Outcome<JFloatArray<'l>> {
     let engine: Arc<Engine> = ENGINES.get(engine)?;
-    let offsets: Vec<f32> = engine.config().rig.joints.iter().flat_map(|j| j.offset).collect();
+    let offsets: Vec<f32> = engine.rig().joints.iter().flat_map(|j| j.offset).collect();
     let array = JFloatArray::new(env, offsets.len())?;
     array.set_region(env, 0, &offsets)?;
     Ok(array)

@@ -15,7 +15,7 @@ use jni::errors::ErrorPolicy;
 use jni::jni_str;
 use jni::strings::{JNIStr, JNIString};
 use std::any::Any;
-use visavis::error::{Error, ErrorKind};
+use visavis::{Error, ErrorKind};
 
 /// Why a native method failed.
 #[derive(Debug)]

@@ -11,9 +11,7 @@ use jni::objects::{JClass, JFloatArray, JIntArray, JObject, JString};
 use jni::sys::{jboolean, jdouble, jfloat, jint, jlong};
 use std::cell::RefCell;
 use std::sync::{Arc, Mutex, MutexGuard};
-use visavis::audio::Voice;
-use visavis::frame::{BLOCK_FRAMES, Frame, Root};
-use visavis::session::{Budget, Governor, Session, SessionOptions};
+use visavis::{BLOCK_FRAMES, Budget, Frame, Governor, Root, Session, SessionOptions, Voice};
 
 pub(crate) static SESSIONS: Table<Mutex<Session>> = Table::new("session");
 
@@ -242,7 +240,7 @@ fn write(frames: &[Frame], out: &mut [f32]) {
 
 /// Floats of a block of this session.
 fn block_floats(session: &Session) -> usize {
-    BLOCK_FRAMES * (HEAD + JOINT * session.engine().config().rig.joints.len())
+    BLOCK_FRAMES * (HEAD + JOINT * session.engine().rig().joints.len())
 }
 
 fn room(session: &Session, there: usize) -> Outcome<usize> {

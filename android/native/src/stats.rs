@@ -6,8 +6,7 @@ use crate::session::with;
 use jni::Env;
 use jni::objects::{JClass, JDoubleArray};
 use jni::sys::jlong;
-use visavis::audio::VoiceStats;
-use visavis::session::SessionStats;
+use visavis::stats::{SessionStats, VoiceStats};
 
 native!("Java_org_visavis_Native_stats": stats(session: jlong) -> jdouble[]);
 

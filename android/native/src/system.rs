@@ -20,11 +20,11 @@ fn version<'l>(env: &mut Env<'l>, _: JClass<'l>) -> Outcome<JString<'l>> {
 }
 
 fn current_thread_id<'l>(_: &mut Env<'l>, _: JClass<'l>) -> Outcome<jint> {
-    Ok(visavis::par::current_thread_id().map_or(0, |id| id as jint))
+    Ok(visavis::threads::current_thread_id().map_or(0, |id| id as jint))
 }
 
 fn pin_current_thread<'l>(_: &mut Env<'l>, _: JClass<'l>, mask: jlong) -> Outcome {
-    Ok(visavis::par::pin_current_thread(mask as u64)?)
+    Ok(visavis::threads::pin_current_thread(mask as u64)?)
 }
 
 /// Engines, sessions and microphones that are open.

@@ -1,8 +1,7 @@
 //! The rig follows exact input exactly, and noisy input without flips.
 
-use super::super::synthetic::{self, Noise};
+use super::super::synthetic::{self, Noise, Walk};
 use super::*;
-use crate::recording::Recording;
 
 fn fit_for(rig: &Rig) -> Fit {
     Fit::new(Kernels::detect().unwrap(), rig)
@@ -14,14 +13,14 @@ fn fitted(fit: &mut Fit, joints: &[Transform]) -> Frame {
     frame
 }
 
-fn placed(recording: &Recording, frame: &Frame) -> Vec<Transform> {
+fn placed(recording: &Walk, frame: &Frame) -> Vec<Transform> {
     let mut out = frame.global.clone();
     recording.rig.fk(frame.hips, &frame.local, &mut out);
     out
 }
 
 /// Positions off by `share` of the bone to the parent (standard deviation), rotations by `share` radians.
-fn noisy(recording: &Recording, frame: &Frame, share: f32, noise: &mut Noise) -> Vec<Transform> {
+fn noisy(recording: &Walk, frame: &Frame, share: f32, noise: &mut Noise) -> Vec<Transform> {
     let jitter = |(j, t): (usize, &Transform)| {
         let scale = share * if j == 0 { 0.2 } else { recording.rig.offset(j).length() };
         Transform {

@@ -12,14 +12,12 @@
 use glam::Vec3;
 use std::sync::Arc;
 use std::time::Instant;
-use visavis::bench::Size;
-use visavis::bundle::BundleFile;
-use visavis::engine::Engine;
-use visavis::frame::Sampler;
-use visavis::kernels::{Kernels, KvDtype, Scheme};
-use visavis::quant::{Options, SMALL, quantise};
-use visavis::session::{Anchoring, Probe, Session, SessionOptions};
-use visavis::trace::{TraceInput, trace};
+use visavis_tools::bench::Size;
+use visavis::{BundleFile, Engine, Sampler, Session, SessionOptions};
+use visavis::internals::kernels::{Kernels, KvDtype, Scheme};
+use visavis::internals::quant::{Options, SMALL, quantise};
+use visavis::internals::session::{Anchoring, Probe};
+use visavis_tools::trace::{TraceInput, trace};
 use visavis_peers::Result;
 use visavis_peers::worker::{Blocks, serve};
 

@@ -1,0 +1,189 @@
+//! `visavis bench`: how fast a bundle, or a size, runs here.
+
+use super::cold_start::{self, ColdStart};
+use super::{allocations, files, print};
+use clap::Args;
+use std::fmt::Write;
+use std::path::PathBuf;
+use visavis::internals::kernels::{Kernels, Scheme};
+use visavis::{BundleFile, Engine, Networks, Result, Sampler};
+use visavis_tools::bench::{Bench, BenchOptions, Machine, STAGES, Size};
+
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// Bundle [default: the shipped one]
+    #[arg(long, value_name = "FILE", conflicts_with = "size")]
+    pub model: Option<PathBuf>,
+    /// Seeded weights of a size instead of a bundle: paper or base
+    #[arg(long, value_name = "SIZE")]
+    pub size: Option<Size>,
+    /// How the weights of --size are stored: f32, f16, i8 or i4
+    #[arg(long, value_name = "SCHEME", default_value = "i8", requires = "size")]
+    pub scheme: Scheme,
+    /// midpoint4, midpoint2, midpoint1, euler:N or single, or several: midpoint4,single
+    #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',', default_values = ["midpoint4", "single"])]
+    pub sampler: Vec<Sampler>,
+    /// Networks to load: all, or those that the samplers need and no encoder, so no re-anchoring (lean)
+    #[arg(long, value_name = "SET", default_value = "all")]
+    pub networks: NetworkSet,
+    /// Threads, 1 or 2, or both one after the other: 1,2
+    #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1,2", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=2))]
+    pub threads: Vec<usize>,
+    /// Sessions that are stepped together, or several numbers one after the other: 1,4
+    #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=64))]
+    pub sessions: Vec<usize>,
+    /// Blocks that are timed
+    #[arg(long, value_name = "N", default_value = "200", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=1_000_000))]
+    pub blocks: usize,
+    /// Leaves out the cold start, for which processes of their own load the bundle
+    #[arg(long)]
+    pub no_cold_start: bool,
+    /// What the cold start is measured by: loads, makes the first frame, says so, goes on for the blocks
+    #[arg(long, hide = true, requires = "model")]
+    pub child: bool,
+    /// Prints JSON: the machine, the kernels, a list of measurements
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Which networks are loaded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum NetworkSet {
+    /// All of the bundle.
+    All,
+    /// Those that the samplers need, without the encoder.
+    Lean,
+}
+
+impl NetworkSet {
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::All => "all",
+            Self::Lean => "lean",
+        }
+    }
+
+    pub(super) fn of(self, samplers: &[Sampler]) -> Networks {
+        match self {
+            Self::All => Networks::default(),
+            Self::Lean => Networks {
+                reference: samplers.iter().any(|sampler| *sampler != Sampler::Single),
+                student: samplers.contains(&Sampler::Single),
+                encoder: false,
+                modulation: samplers.iter().any(|s| matches!(s, Sampler::Euler(n) if ![1, 2, 4, 8].contains(n))),
+            },
+        }
+    }
+}
+
+pub fn run(args: &BenchArgs) -> Result<()> {
+    if let (true, Some(path)) = (args.child, &args.model) {
+        return cold_start::child(args, path);
+    }
+    let started = std::time::Instant::now();
+    let networks = args.networks.of(&args.sampler);
+    let engine = match args.size {
+        Some(size) => size.engine_with(args.scheme, Kernels::detect()?, networks)?,
+        None => {
+            let file = BundleFile::open(files::model(args.model.as_deref())?)?;
+            Engine::from_file_with(&file, Kernels::detect()?, networks)?
+        }
+    };
+    let load_ms = 1000.0 * started.elapsed().as_secs_f64();
+    let (machine, kernels) = (Machine::here(), engine.kernels());
+    let mut benches = Vec::new();
+    let allocations: Option<fn() -> u64> = Some(allocations::count);
+    for &sampler in &args.sampler {
+        for &threads in &args.threads {
+            for &sessions in &args.sessions {
+                let options = BenchOptions { sampler, threads, sessions, blocks: args.blocks, allocations };
+                benches.push(Bench::run(&engine, options)?);
+            }
+        }
+    }
+    let cold = if args.no_cold_start { Ok(Vec::new()) } else { cold_starts(args)? };
+    if args.json {
+        let variants: serde_json::Map<_, _> =
+            kernels.variants().iter().map(|(name, v)| ((*name).to_owned(), (*v).into())).collect();
+        let all = serde_json::json!({
+            "machine": machine, "level": kernels.level().to_string(), "kernels": variants, "load_ms": load_ms, "benches": benches,
+            "cold_start": cold.unwrap_or_default(),
+        });
+        return print(&format!("{all:#}\n"));
+    }
+    let mut text = String::new();
+    // Writing to a string does not fail.
+    let _ = writeln!(text, "{} ({} processors), {} kernels", machine.cpu, machine.processors, kernels.level());
+    let _ = writeln!(
+        text,
+        "{}",
+        kernels.variants().iter().map(|(name, v)| format!("{name} {v}")).collect::<Vec<_>>().join(", ")
+    );
+    let made = if args.size.is_some() { "drawn and packed" } else { "loaded" };
+    let _ = writeln!(text, "{}, {made} in {load_ms:.0} ms", engine.config().name);
+    benches.iter().for_each(|bench| text.push_str(&lines(bench)));
+    match cold {
+        Ok(cold) if cold.is_empty() => {}
+        Ok(cold) => cold.iter().for_each(|c| text += &format!("\n{}", c.line())),
+        Err(e) => text += &format!("\ncold start not measured: {e}\n"),
+    }
+    print(&text)
+}
+
+/// The cold start with each sampler and number of threads; the inner error where no process could be started.
+fn cold_starts(args: &BenchArgs) -> Result<std::io::Result<Vec<ColdStart>>> {
+    let file = match args.size {
+        Some(size) => cold_start::File::drawn(size, args.scheme)?,
+        None => cold_start::File::of(files::model(args.model.as_deref())?),
+    };
+    let each = args.sampler.iter().flat_map(|sampler| args.threads.iter().map(move |threads| (*sampler, *threads)));
+    Ok(each.map(|(sampler, threads)| cold_start::measure(&file, sampler, threads, args.networks)).collect())
+}
+
+fn lines(b: &Bench) -> String {
+    let [p50, p95, p99, max] = b.block_ms;
+    let many = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
+    let megabytes = |bytes: Option<u64>| bytes.map_or_else(|| "unknown".into(), |b| format!("{} MB", b / 1_000_000));
+    let mut text = format!(
+        "\n{}, {}, {}: {:.0} frames/s, {:.1} x real time\n",
+        b.sampler,
+        many(b.threads, "thread"),
+        many(b.sessions, "session"),
+        b.frames_per_second,
+        b.real_time_factor,
+    );
+    let mut line = |name: &str, what: String| text.push_str(&format!("  {name:<8} {what}\n"));
+    line("block", format!("p50 {p50:.2}, p95 {p95:.2}, p99 {p99:.2}, max {max:.2} ms of 133.3 ms"));
+    if let Some(stages) = &b.stages {
+        let stages: Vec<_> = STAGES.iter().zip(stages.all()).map(|(name, time)| format!("{name} {time:.2}")).collect();
+        line("stages", format!("{} ms", stages.join(", ")));
+    } else {
+        line("shared", format!("{:.1} of {} blocks shared passes over the weights", b.shared_blocks, b.sessions));
+    }
+    line(
+        "weights",
+        format!(
+            "{:.1} MB a block and session, {:.1} GB/s; a reading loop gets {:.1} GB/s here now: {:.0} % of it for one session's",
+            b.weight_bytes_a_block as f64 / 1e6,
+            b.weights_gb_s,
+            b.read_limit_gb_s,
+            100.0 * b.share_of_read_limit,
+        ),
+    );
+    line(
+        "memory",
+        format!(
+            "weights {} MB, caches {} MB, resident {}, at most {}",
+            b.weight_bytes / 1_000_000,
+            b.cache_bytes / 1_000_000,
+            megabytes(b.resident_bytes),
+            megabytes(b.peak_resident_bytes),
+        ),
+    );
+    if let Some(calls) = b.steady_allocations {
+        line("steady", many(calls as usize, "allocation"));
+    }
+    line("start", format!("first frame {:.0} ms after the engine", b.first_frame_ms));
+    text
+}

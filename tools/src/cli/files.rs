@@ -1,0 +1,58 @@
+//! Where the files that come with the program are.
+
+use std::path::{Path, PathBuf};
+use visavis::{Error, ErrorKind, Result};
+use visavis_tools::offline::Conversation;
+
+/// The shipped bundles; the first that is there is the default.
+const MODELS: [&str; 2] = ["models/visavis-base-i8.safetensors", "models/visavis-base.safetensors"];
+
+/// The bundle to use: `given`, else the shipped one.
+pub fn model(given: Option<&Path>) -> Result<PathBuf> {
+    match given {
+        Some(path) => Ok(path.to_path_buf()),
+        None => {
+            let found = MODELS.iter().find_map(|model| shipped(model).ok());
+            let tried = || MODELS.iter().filter_map(|model| shipped(model).err()).flatten().collect::<Vec<_>>();
+            found.ok_or_else(|| missing("the model", &tried(), "; or name a bundle with --model"))
+        }
+    }
+}
+
+/// A file of the sample conversation.
+fn sample(name: &str) -> Result<PathBuf> {
+    shipped(&format!("samples/{name}")).map_err(|tried| missing("the sample conversation", &tried, ""))
+}
+
+/// The sample conversation.
+pub fn conversation() -> Result<Conversation> {
+    let [agent, user, path] = ["agent.wav", "user.wav", "user.csv"].map(sample);
+    Conversation::read(Some(&agent?), Some(&user?), Some(&path?))
+}
+
+/// An error if both names stand for one file: a mapped bundle must not be written to.
+pub fn apart(input: &Path, output: &Path) -> Result<()> {
+    if input.canonicalize().ok().zip(output.canonicalize().ok()).is_none_or(|(a, b)| a != b) {
+        return Ok(());
+    }
+    let message = "the result would take the place of the bundle it is made from; give another name";
+    Err(Error::new(ErrorKind::Argument, message).with_path(output))
+}
+
+/// Looks for `relative` in the current folder, beside the program, and where the program was built; else what was tried.
+fn shipped(relative: &str) -> Result<PathBuf, Vec<PathBuf>> {
+    let beside = std::env::current_exe().ok().and_then(|exe| Some(exe.parent()?.join(relative)));
+    let built = Path::new(env!("CARGO_MANIFEST_DIR")).parent().map(|repository| repository.join(relative));
+    let tried = [Some(PathBuf::from(relative)), beside, built];
+    let tried: Vec<_> = tried.into_iter().flatten().collect();
+    tried.iter().find(|path| path.exists()).cloned().ok_or(tried)
+}
+
+fn missing(what: &str, tried: &[PathBuf], advice: &str) -> Error {
+    let list: Vec<_> = tried.iter().map(|path| path.display().to_string()).collect();
+    let message = format!(
+        "{what} is not there (tried {}); run visavis in its repository, or copy the file there{advice}",
+        list.join(", ")
+    );
+    Error::new(ErrorKind::Io, message)
+}

@@ -1,0 +1,297 @@
+//! Is the motion any good? A bundle judged on recorded conversations.
+//!
+//! ```text
+//! clips -> windows -> rows: corpus, Random, NN, each sampler, each gaze target -> Report -> text, JSON, Markdown
+//!                  -> reconstruction, reaction time, endurance, following        -> verdicts on the targets
+//! ```
+//!
+//! A [`Window`] is 13.3 s of a clip. The model is given its voices and the way of its user, starting where the clip's agent stands two
+//! seconds earlier; then all motions are measured over the same frames by the same code ([`crate::metrics`]), the corpus' own included.
+//! Everything is deterministic: same bundle, clips and options, same figures, on any number of threads.
+//!
+//! ```no_run
+//! # fn main() -> visavis::Result<()> {
+//! use visavis::Engine;
+//! use visavis_tools::eval::{Clip, EvalOptions, evaluate};
+//!
+//! let engine = Engine::load("models/visavis-base-i8.safetensors")?;
+//! let clips = Clip::list("corpus/test", &engine.config().rig)?;
+//! let report = evaluate(&engine, &clips, None, &EvalOptions::default(), &|_| {})?;
+//! println!("{}", report.to_text());
+//! # Ok(())
+//! # }
+//! ```
+
+mod bank;
+mod calibrate;
+mod clip;
+mod endurance;
+mod figures;
+mod made_up;
+mod motion;
+mod parallel;
+mod reaction;
+mod reconstruction;
+mod report;
+mod targets;
+mod window;
+
+pub use bank::Bank;
+pub use calibrate::calibrate;
+pub use clip::{Clip, Segment};
+pub use endurance::{Change, Endurance, Follow};
+pub use figures::{CORRECT, Figures, Row};
+pub use made_up::made_up;
+pub use reaction::{FOUND, PATIENCE, Reaction};
+pub use reconstruction::Reconstruction;
+pub use targets::Verdict;
+pub use window::{LEAD, WINDOW, Window};
+
+use figures::Measured;
+use parallel::each;
+use serde::Serialize;
+use std::sync::Arc;
+use visavis::{Engine, Error, ErrorKind, Frame, Result, Sampler, SessionOptions};
+
+/// Gaze targets of the dial (SARAH table 2).
+pub const GAZE_TARGETS: [f32; 5] = [0.0, 0.25, 0.5, 0.8, 1.0];
+
+/// What is evaluated, and how thoroughly.
+#[derive(Debug, Clone)]
+pub struct EvalOptions {
+    /// Most windows, spread evenly over the clips.
+    pub windows: usize,
+    /// Threads that work on different windows.
+    pub threads: usize,
+    /// Samplers to compare; the first is the reference. Those that need a student are left out of a bundle without one.
+    pub samplers: Vec<Sampler>,
+    /// Options of every session; seed, start, sampler and gaze are set by the evaluation.
+    pub session: SessionOptions,
+    /// Fewer and shorter runs, for a look: the gaze dial, reaction, endurance and following are tried a few times only.
+    pub quick: bool,
+    /// Only what two bundles are compared by: the corpus' row, the samplers' with free gaze, reconstruction. No looked-up motion, gaze
+    /// dials, reaction, endurance and following.
+    pub motion_only: bool,
+    /// Window `i` has the seed `2^32 seed + i`: with another seed here the figures tell what chance alone changes.
+    pub seed: u32,
+}
+
+impl Default for EvalOptions {
+    /// 64 windows on two threads, all samplers of the reference and the single step.
+    fn default() -> Self {
+        Self {
+            windows: 64,
+            threads: 2,
+            samplers: vec![Sampler::Midpoint(4), Sampler::Midpoint(2), Sampler::Midpoint(1), Sampler::Single],
+            session: SessionOptions::default(),
+            quick: false,
+            motion_only: false,
+            seed: 0,
+        }
+    }
+}
+
+/// The gaze dial of a sampler (SARAH table 2).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Dial {
+    /// The sampler.
+    pub sampler: String,
+    /// Gaze targets.
+    pub targets: Vec<f32>,
+    /// Mean gaze score at each.
+    pub reached: Vec<f64>,
+    /// Windows in which the corpus' own agent has a mean score within 0.1 of the target.
+    pub windows: Vec<usize>,
+}
+
+/// All figures of a bundle.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// Name of the model.
+    pub model: String,
+    /// Clips that there were, and windows that were measured.
+    pub clips: usize,
+    /// Windows, in all and in which the agent speaks.
+    pub windows: [usize; 2],
+    /// Whether this was a quick look.
+    pub quick: bool,
+    /// What Random and NN looked up their motion in.
+    pub bank: String,
+    /// `corpus`, `Random`, `NN` (these two where they were asked for), then the samplers with free gaze, then the gaze targets.
+    pub rows: Vec<Row>,
+    /// The gaze dial of the first sampler and of the single step.
+    pub dials: Vec<Dial>,
+    /// What the autoencoder loses.
+    pub reconstruction: Reconstruction,
+    /// Reaction times of the first sampler.
+    pub reaction: Option<Reaction>,
+    /// A long run of the first sampler.
+    pub endurance: Option<Endurance>,
+    /// A user who walks away.
+    pub follow: Option<Follow>,
+    /// Targets, met or missed.
+    pub verdicts: Vec<Verdict>,
+}
+
+/// How far an evaluation has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EvalProgress<'a> {
+    /// What is measured.
+    pub stage: &'a str,
+    /// Windows of it that are done, and that there are.
+    pub done: usize,
+    /// Windows that there are; 0 where a stage is not counted.
+    pub total: usize,
+}
+
+/// Evaluates a bundle on `clips`; `bank` are other clips, best those of training, in which Random and NN look up their motion.
+///
+/// # Errors
+/// Those of [`Clip::read`], [`Window::choose`] and of sessions made with the options; [`ErrorKind::Argument`] for options that
+/// make no sense.
+pub fn evaluate(
+    engine: &Arc<Engine>,
+    clips: &[Clip],
+    bank: Option<&[Clip]>,
+    options: &EvalOptions,
+    progress: &(dyn Fn(EvalProgress<'_>) + Sync),
+) -> Result<Report> {
+    let windows = Window::choose(clips, options.windows)?;
+    let tell = |stage: &str| progress(EvalProgress { stage, done: 0, total: 0 });
+    let judge = Judge { engine, windows: &windows, options, progress };
+
+    let truth = judge.measure("corpus", &|_, window| Ok(Some(window.truth.frames.clone())))?.unwrap_or_default();
+    let mut rows = vec![Row::new("corpus".into(), None, &truth, &truth)];
+    let mut searched = "nothing".to_owned();
+    if !options.motion_only {
+        tell("bank");
+        let own = bank.is_none();
+        let bank = Bank::new(bank.unwrap_or(clips).to_vec(), own)?;
+        let random = |i: usize, window: &Window| bank.random(window, i as u64);
+        let nearest = |_: usize, window: &Window| bank.nearest(window);
+        for (name, source) in [("Random", &random as Source<'_>), ("NN", &nearest)] {
+            if let Some(motion) = judge.measure(name, source)? {
+                rows.push(Row::new(name.into(), None, &motion, &truth));
+            }
+        }
+        searched = format!("{} stretches of {}", bank.len(), if own { "the other clips" } else { "the bank" });
+    }
+    let samplers = judge.samplers()?;
+    for &sampler in &samplers {
+        rows.push(judge.row(sampler, None, &truth)?);
+    }
+    let mut dials = Vec::new();
+    for (i, &sampler) in samplers.iter().enumerate() {
+        if options.motion_only || i > 0 && sampler != Sampler::Single {
+            continue;
+        }
+        let dialled: Vec<Row> =
+            GAZE_TARGETS.iter().map(|&g| judge.row(sampler, Some(g), &truth)).collect::<Result<_>>()?;
+        dials.push(Dial::new(sampler, &dialled, &truth));
+        rows.extend(dialled);
+    }
+
+    let session = SessionOptions { sampler: samplers[0], gaze: None, ..options.session.clone() };
+    let (threads, quick) = (options.threads, options.quick);
+    tell("reconstruction");
+    let reconstruction = Reconstruction::measure(engine, &windows, threads)?;
+    let (mut reaction, mut follow, mut endurance) = (None, None, None);
+    if !options.motion_only {
+        tell("reaction time");
+        reaction = Some(Reaction::measure(engine, &session, clips, &windows, threads, quick)?);
+        tell("following");
+        follow = Some(Follow::measure(engine, &session, &windows, threads, quick)?);
+        tell("endurance");
+        endurance = Some(Endurance::measure(engine, &session, &windows, threads, quick)?);
+    }
+    let mut report = Report {
+        model: engine.config().name.clone(),
+        clips: clips.len(),
+        windows: [windows.len(), windows.iter().filter(|w| w.speaking).count()],
+        quick,
+        bank: searched,
+        rows,
+        dials,
+        reconstruction,
+        reaction,
+        endurance,
+        follow,
+        verdicts: Vec::new(),
+    };
+    report.verdicts = targets::verdicts(&report);
+    Ok(report)
+}
+
+/// Motion in a window, given its number; `None` where there is none.
+type Source<'a> = &'a (dyn Fn(usize, &Window) -> Result<Option<Vec<Frame>>> + Sync);
+
+/// Measures motions in the same windows.
+struct Judge<'a> {
+    engine: &'a Arc<Engine>,
+    windows: &'a [Window],
+    options: &'a EvalOptions,
+    progress: &'a (dyn Fn(EvalProgress<'_>) + Sync),
+}
+
+impl Judge<'_> {
+    /// Every window's motion measured; `None` if any window has none.
+    fn measure(&self, stage: &str, source: Source<'_>) -> Result<Option<Vec<Measured>>> {
+        let rig = &self.engine.config().rig;
+        let total = self.windows.len();
+        let done = |done| (self.progress)(EvalProgress { stage, done, total });
+        let measured = each(self.options.threads, total, &done, &|i| {
+            let window = &self.windows[i];
+            source(i, window)?.map(|frames| Measured::of(rig, window, frames)).transpose()
+        })?;
+        Ok(measured.into_iter().collect())
+    }
+
+    /// The row of a sampler at a gaze target.
+    fn row(&self, sampler: Sampler, gaze: Option<f32>, truth: &[Measured]) -> Result<Row> {
+        let name = gaze.map_or_else(|| sampler.to_string(), |g| format!("{sampler}, gaze {g}"));
+        let motion = self.measure(&name, &|i, window| {
+            let seed = u64::from(self.options.seed) << 32 | i as u64;
+            let options = SessionOptions { sampler, gaze, seed, ..self.options.session.clone() };
+            motion::in_window(self.engine, &options, window).map(Some)
+        })?;
+        Ok(Row::new(name, gaze, &motion.unwrap_or_default(), truth))
+    }
+
+    /// The samplers that the bundle has.
+    fn samplers(&self) -> Result<Vec<Sampler>> {
+        let has = |s: &Sampler| *s != Sampler::Single || self.engine.config().student.is_some();
+        let samplers: Vec<_> = self.options.samplers.iter().copied().filter(has).collect();
+        if samplers.is_empty() {
+            return Err(Error::new(ErrorKind::Argument, "no sampler to evaluate that this bundle has"));
+        }
+        Ok(samplers)
+    }
+}
+
+impl Dial {
+    fn new(sampler: Sampler, rows: &[Row], truth: &[Measured]) -> Self {
+        let near = |target: f32| {
+            let close = |m: &&Measured| m.head_angle().is_some_and(|g| (g - f64::from(target)).abs() <= 0.1);
+            truth.iter().filter(close).count()
+        };
+        let reached = rows.iter().map(|row| row.all.head_angle.unwrap_or(f64::NAN)).collect();
+        let windows = GAZE_TARGETS.iter().map(|&t| near(t)).collect();
+        Self { sampler: sampler.to_string(), targets: GAZE_TARGETS.to_vec(), reached, windows }
+    }
+}
+
+impl Report {
+    /// The row of this name.
+    pub fn row(&self, name: &str) -> Option<&Row> {
+        self.rows.iter().find(|row| row.name == name)
+    }
+
+    /// The rows of the model with free gaze.
+    pub fn models(&self) -> impl Iterator<Item = &Row> {
+        let others = ["corpus", "Random", "NN"];
+        self.rows.iter().filter(move |row| row.gaze_target.is_none() && !others.contains(&row.name.as_str()))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,283 @@
+//! Whole files in, a [`Recording`] out: what the command line does, for programs that work on finished recordings.
+//!
+//! ```text
+//! Conversation (voices at 24 kHz, path) -> run(session) -> Outcome (recording, statistics) -> OutputFolder -> files
+//! ```
+//!
+//! A [`Session`] is driven exactly as a live caller drives it: sound and head positions are pushed in order and each
+//! block is polled when it is due, so an offline run gives the motion that a live one would have given.
+//!
+//! ```no_run
+//! # fn main() -> visavis::Result<()> {
+//! use visavis::{Engine, SessionOptions};
+//! use visavis_tools::offline::{Conversation, run};
+//!
+//! let engine = Engine::load("models/visavis-base-i8.safetensors")?;
+//! let mut session = engine.session(SessionOptions::default())?;
+//! let talk = Conversation::read(Some("agent.wav".as_ref()), None, Some("user.csv".as_ref()))?;
+//! let outcome = run(&mut session, &talk, &mut |p| eprintln!("{} of {} frames", p.frames, p.total))?;
+//! visavis_tools::export::write_bvh(&outcome.recording, "motion.bvh")?;
+//! # Ok(())
+//! # }
+//! ```
+
+mod csv;
+mod output;
+mod path;
+mod wav;
+
+pub use csv::UserPath;
+pub use output::{FILES, OutputFolder};
+pub use path::for_session;
+pub use wav::Wav;
+
+use crate::recording::Recording;
+use std::path::Path;
+use std::time::{Duration, Instant};
+use visavis::internals::frame::BLOCK_SAMPLES;
+use visavis::internals::quant::Scene;
+use visavis::stats::SessionStats;
+use visavis::{BLOCK_FRAMES, Error, ErrorKind, FPS, Result, SAMPLE_RATE, Session};
+
+/// Longest conversation that is taken, seconds: longer ones are wrong units or clock times more often than they are meant.
+pub const MAX_SECONDS: f64 = 2.0 * 3600.0;
+
+/// What one conversation sounds and looks like; at least one of the three is there, and it is longer than nothing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Conversation {
+    agent: Option<Vec<f32>>,
+    user: Option<Vec<f32>>,
+    path: Option<UserPath>,
+}
+
+impl Conversation {
+    /// Reads the agent's voice, the user's voice (WAV, see [`Wav::read`]) and the path of the user's head (CSV, see
+    /// [`UserPath::read`]). What is `None` is absent, which is not the same as silent or far away.
+    ///
+    /// # Errors
+    /// Those of the readers, and of [`Conversation::new`], naming the file.
+    pub fn read(agent: Option<&Path>, user: Option<&Path>, path: Option<&Path>) -> Result<Self> {
+        let voice = |file: &Path| Wav::read(file)?.to_24k().map_err(|e| e.with_path(file));
+        let talk = Self {
+            agent: agent.map(voice).transpose()?,
+            user: user.map(voice).transpose()?,
+            path: path.map(UserPath::read).transpose()?,
+        };
+        // The length is checked file by file, so that the error can name the one that is too long.
+        for (file, seconds) in [agent, user, path].into_iter().zip(talk.lengths()) {
+            if let (Some(file), Some(seconds)) = (file, seconds) {
+                check_length(seconds).map_err(|e| e.with_path(file))?;
+            }
+        }
+        talk.checked().map_err(|e| match path {
+            Some(file) => e.with_path(file),
+            None => e,
+        })
+    }
+
+    /// A conversation from voices at 24 kHz mono (full scale 1, finite, sample `n` at `n / 24000` s) and a path.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] when there is nothing at all; [`ErrorKind::UserPath`] when the path is all there is and
+    /// ends at or before 0 s; either when a part is longer than [`MAX_SECONDS`].
+    pub fn new(agent: Option<Vec<f32>>, user: Option<Vec<f32>>, path: Option<UserPath>) -> Result<Self> {
+        let talk = Self { agent, user, path };
+        talk.lengths().into_iter().flatten().try_for_each(check_length)?;
+        talk.checked()
+    }
+
+    fn checked(self) -> Result<Self> {
+        if self.frames() > 0 {
+            return Ok(self);
+        }
+        Err(match &self.path {
+            None => Error::new(ErrorKind::Argument, "nothing to generate from: give a voice or the user's path"),
+            Some(path) => Error::new(
+                ErrorKind::UserPath,
+                format!(
+                    "the path ends at {} s, so the conversation has no length; times count from 0, the start",
+                    path.end()
+                ),
+            ),
+        })
+    }
+
+    /// Seconds of the agent's voice, the user's voice and the path.
+    fn lengths(&self) -> [Option<f64>; 3] {
+        let voice = |v: &Vec<f32>| v.len() as f64 / f64::from(SAMPLE_RATE);
+        [self.agent.as_ref().map(voice), self.user.as_ref().map(voice), self.path.as_ref().map(UserPath::end)]
+    }
+
+    /// Length, seconds: that of the longest part.
+    pub fn seconds(&self) -> f64 {
+        self.lengths().into_iter().flatten().fold(0.0, f64::max)
+    }
+
+    /// Frames of motion that cover it, at 30 fps.
+    pub fn frames(&self) -> usize {
+        // The tolerance keeps a length such as 0.1 s, which is no binary fraction, from costing a frame.
+        (self.seconds() * f64::from(FPS) - 1e-6).ceil().max(0.0) as usize
+    }
+
+    /// The agent's voice, 24 kHz mono.
+    pub fn agent(&self) -> Option<&[f32]> {
+        self.agent.as_deref()
+    }
+
+    /// The user's voice, 24 kHz mono.
+    pub fn user(&self) -> Option<&[f32]> {
+        self.user.as_deref()
+    }
+
+    /// The first `blocks` blocks (all of them when there are fewer) as the quantiser takes them, with a gaze target or none.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] when there is not a whole block.
+    pub fn scene(&self, blocks: usize, gaze: Option<f32>) -> Result<Scene> {
+        let frames = BLOCK_FRAMES * blocks.min(self.frames() / BLOCK_FRAMES);
+        let head = |i: usize| self.path().and_then(|p| p.at(i as f64 / f64::from(FPS)));
+        let heads: Vec<_> = (0..frames).map(head).collect();
+        Scene::new(self.agent().unwrap_or_default(), self.user().unwrap_or_default(), &heads, gaze)
+    }
+
+    /// The path of the user's head.
+    pub fn path(&self) -> Option<&UserPath> {
+        self.path.as_ref()
+    }
+}
+
+fn check_length(seconds: f64) -> Result<()> {
+    if seconds <= MAX_SECONDS {
+        return Ok(());
+    }
+    let message = format!(
+        "lasts until {seconds:.0} s, longer than {MAX_SECONDS:.0} s; times are seconds since the start of the \
+         conversation (subtract a clock's start time), and longer recordings go in parts"
+    );
+    Err(Error::new(ErrorKind::Argument, message))
+}
+
+/// How far a run has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    /// Frames done.
+    pub frames: usize,
+    /// Frames that there will be.
+    pub total: usize,
+    /// Time since the run started.
+    pub elapsed: Duration,
+}
+
+/// What came out of a run.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// The motion, with what was heard and seen.
+    pub recording: Recording,
+    /// Block times, delays and counters.
+    pub stats: SessionStats,
+    /// Time that pushing and computing took, without loading files and models.
+    pub elapsed: Duration,
+}
+
+impl Outcome {
+    /// Frames generated a second.
+    pub fn frames_per_second(&self) -> f64 {
+        self.recording.frames.len() as f64 / self.elapsed.as_secs_f64().max(1e-9)
+    }
+
+    /// Seconds of motion generated a second: above 1 is faster than real time.
+    pub fn real_time_factor(&self) -> f64 {
+        self.frames_per_second() / f64::from(FPS)
+    }
+}
+
+/// Resets `session`, plays the whole conversation to it and returns the motion; `progress` is called after each block.
+///
+/// Voices come a block ahead, as from text-to-speech; the session itself never uses the user's future.
+///
+/// # Errors
+/// Those of pushing and polling; none for finite voices and a session that was just made.
+pub fn run(session: &mut Session, talk: &Conversation, progress: &mut dyn FnMut(Progress)) -> Result<Outcome> {
+    session.reset()?;
+    let total = talk.frames();
+    let points = talk.path.as_ref().map(for_session).unwrap_or_default();
+    let mut points = points.into_iter().peekable();
+    let mut voices = [talk.agent.as_deref(), talk.user.as_deref()].map(|v| v.unwrap_or_default().chunks(BLOCK_SAMPLES));
+    let mut frames = Vec::with_capacity(total);
+    let started = Instant::now();
+    for _ in 0..total.div_ceil(BLOCK_FRAMES) {
+        let now = session.next_due();
+        if let Some(samples) = voices[0].next() {
+            session.push_agent_audio(samples, SAMPLE_RATE)?;
+        }
+        if let Some(samples) = voices[1].next() {
+            session.push_user_audio(samples, SAMPLE_RATE)?;
+        }
+        while let Some((time, position)) = points.next_if(|(time, _)| *time <= now) {
+            session.push_user_head(position, time)?;
+        }
+        if let Some(block) = session.poll(now)? {
+            let wanted = block.len().min(total - frames.len());
+            frames.extend_from_slice(&block[..wanted]);
+        }
+        progress(Progress { frames: frames.len(), total, elapsed: started.elapsed() });
+    }
+    let elapsed = started.elapsed();
+    let user = frames.iter().map(|f| talk.path.as_ref().and_then(|p| p.at(f.time))).collect();
+    let recording = Recording {
+        rig: session.engine().config().rig.clone(),
+        frames,
+        user,
+        agent_voice: talk.agent.clone(),
+        user_voice: talk.user.clone(),
+        gaze_target: session.options().gaze,
+    };
+    Ok(Outcome { recording, stats: session.stats(), elapsed })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use visavis::internals::user::HeadTrack;
+
+    fn path(text: &str) -> Option<UserPath> {
+        Some(UserPath::parse(text).unwrap())
+    }
+
+    #[test]
+    fn the_longest_part_gives_the_length() {
+        let talk = Conversation::new(Some(vec![0.0; 24_000]), None, path("t,x,y,z\n0,0,0,0\n0.1,0,0,0\n")).unwrap();
+        assert_eq!((talk.seconds(), talk.frames()), (1.0, 30));
+        let talk = Conversation::new(Some(vec![0.0; 24_001]), None, None).unwrap();
+        assert_eq!(talk.frames(), 31);
+        let talk = Conversation::new(None, Some(vec![0.0; 10]), path("t,x,y,z\n0,0,0,0\n0.1,0,0,0\n")).unwrap();
+        assert_eq!((talk.seconds(), talk.frames()), (0.1, 3));
+    }
+
+    #[test]
+    fn conversations_without_length_or_end_are_refused() {
+        let kind = |agent, path| Conversation::new(agent, None, path).unwrap_err().kind();
+        assert_eq!(kind(None, None), ErrorKind::Argument);
+        assert_eq!(kind(Some(Vec::new()), None), ErrorKind::Argument);
+        assert_eq!(kind(None, path("t,x,y,z\n-1,0,0,0\n0,0,0,0\n")), ErrorKind::UserPath);
+        let e = Conversation::new(None, None, path("t,x,y,z\n0,0,0,0\n1.7e9,0,0,0\n")).unwrap_err();
+        assert!(e.kind() == ErrorKind::Argument && e.to_string().contains("clock"), "{e}");
+    }
+
+    #[test]
+    fn the_sample_conversation_is_usable() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../samples");
+        let path = UserPath::read(folder.join("user.csv")).unwrap();
+        for voice in ["agent.wav", "user.wav"] {
+            let wav = Wav::read(folder.join(voice)).unwrap();
+            assert_eq!(wav.to_24k().unwrap().len(), 219 * BLOCK_SAMPLES, "{voice}");
+            assert!((wav.seconds() - path.end()).abs() < 0.02);
+            let spoken = wav.samples.iter().filter(|s| s.abs() > 0.02).count();
+            assert!(spoken > wav.samples.len() / 20, "{voice} is silent");
+        }
+        let mut track = HeadTrack::new();
+        path.points().iter().for_each(|&(time, position)| track.push(position, time));
+        let stats = track.stats();
+        assert_eq!((stats.accepted, stats.teleports, stats.overwritten), (path.points().len() as u64, 0, 0));
+    }
+}
