@@ -6,8 +6,8 @@ import types
 
 import numpy as np
 import pytest
-import soundfile
 import torch
+from scipy.io import wavfile
 
 from visavis_train import export, make_tiny
 from visavis_train.corpus import store
@@ -74,7 +74,7 @@ def place(tmp_path_factory):
             store.save(str(root / "corpus" / split / f"talk_{i}.safetensors"), p, rig.quat_to_mat(q), np.tile([0, 1.6, 2.0], (320, 1)), voice(),
                        voice() if i else None, {"kind": "talk", "split": split, "sources": []})
     os.makedirs(root / "speech")
-    soundfile.write(str(root / "speech" / "a.wav"), 0.1 * random.standard_normal(60000), 24000)
+    wavfile.write(str(root / "speech" / "a.wav"), 24000, (0.1 * random.standard_normal(60000)).astype(np.float32))
     few = ("--size", "tiny", "--steps", 2, "--batch", 2)
     call(audio, "--speech", root / "speech", "--out", root / "audio.pt", *few)
     call(vae, "--corpus", root / "corpus", "--out", root / "vae.pt", "--blocks", 8, *few)

@@ -11,7 +11,7 @@ from visavis_train.train import audio
 
 
 def arguments(**kw):
-    given = dict(work="W", data="D", hours=1.0, scale=0.5, size="base", seed=3, threads=1, workers=2, start=None, keep_minutes=4.0, more=[])
+    given = dict(work="W", data="D", hours=1.0, scale=0.5, size="base", seed=3, threads=1, workers=2, processes=None, start=None, keep_minutes=4.0, more=[])
     return types.SimpleNamespace(**(given | kw))
 
 

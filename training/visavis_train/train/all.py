@@ -23,7 +23,8 @@ STEPS = {
     "mid": {"audio": 3000, "vae": 8000, "flow": 60000, "flow-audio": 1500, "student": 4000, "decoder": 600},
     "paper": {"audio": 3000, "vae": 20000, "flow": 100000, "flow-audio": 2000, "student": 6000, "decoder": 1000},
 }
-TRAINED = ("audio", "vae", "flow", "flow-audio", "student", "decoder")
+CHECKPOINTS = {"audio": "audio.pt", "vae": "vae.pt", "flow": "flow.pt", "flow-audio": "flow-audio.pt", "student": "student.pt", "decoder": "vae-fine.pt"}
+TRAINED = tuple(CHECKPOINTS)
 
 
 def stages(a):
@@ -32,35 +33,36 @@ def stages(a):
     at = lambda name: os.path.join(runs, name)
     if not a.data and not a.start:
         raise SystemExit("--data is needed: the audio encoder trains on DATA/speech (or give --start, and its audio encoder is kept)")
-    alone = at("audio.pt") if a.data else os.path.join(runs, "start", "audio.pt")
-    flow, heard, some = at("flow-audio.pt"), at("cache-audio"), ["--threads", str(a.threads)]
-    many = [*some, "--workers", str(a.workers)]
+    alone = at(CHECKPOINTS["audio"]) if a.data else os.path.join(runs, "start", "audio.pt")
+    heard, many = at("cache-audio"), ["--threads", str(a.threads), "--workers", str(a.workers)]
     start = lambda name: ["--init", os.path.join(runs, "start", f"{name}.pt")] if a.start else []
     length = lambda name: ["--steps", str(max(1, round(STEPS[a.size][name] * a.scale))), "--seed", str(a.seed), "--keep-minutes", str(a.keep_minutes)]
-    train = lambda name, out, *given: (name, at(out), "train." + {"flow-audio": "flow"}.get(name, name),
-                                       ["--out", at(out), *given, *length(name), *many, *shlex.split(dict(a.more).get(name, ""))])
+    kept = {name: at(file) for name, file in CHECKPOINTS.items()}
+    flow = kept["flow-audio"]
+    train = lambda name, *given: (name, kept[name], "train." + {"flow-audio": "flow"}.get(name, name),
+                                  ["--out", kept[name], *given, *length(name), *many, *shlex.split(dict(a.more).get(name, ""))])
     out = []
     if a.data and not glob.glob(os.path.join(corpus, "train", "*.safetensors")):
-        out.append(("corpus", None, "corpus", ["--data", a.data, "--out", corpus, "--hours", str(a.hours), "--workers", str(a.workers)]))
+        out.append(("corpus", None, "corpus", ["--data", a.data, "--out", corpus, "--hours", str(a.hours), "--workers", str(a.processes or a.workers)]))
     if a.start:
         out.append(("start", None, "checkpoints", ["--bundle", a.start, "--out", at("start")]))
-    out.append(("arrays", None, "train.data", ["--corpus", corpus, "--workers", str(a.workers)]))
+    out.append(("arrays", None, "train.data", ["--corpus", corpus, "--workers", str(a.processes or a.workers)]))
     if a.data:
-        out.append(train("audio", "audio.pt", "--speech", os.path.join(a.data, "speech"), "--size", a.size, "--only", ",".join(SPLITS["train"]),
+        out.append(train("audio", "--speech", os.path.join(a.data, "speech"), "--size", a.size, "--only", ",".join(SPLITS["train"]),
                          "--validate", ",".join(SPLITS["val"]), *start("audio")))
     out += [
-        train("vae", "vae.pt", "--corpus", corpus, "--size", a.size, *start("vae")),
-        ("cache", None, "train.cache", ["--corpus", corpus, "--vae", at("vae.pt"), "--audio", alone, "--out", at("cache"), *many]),
-        train("flow", "flow.pt", "--cache", at("cache"), "--vae", at("vae.pt"), "--size", a.size, *start("flow")),
-        train("flow-audio", "flow-audio.pt", "--cache", at("cache"), "--vae", at("vae.pt"), "--init", at("flow.pt"), "--end-to-end", alone, "--corpus", corpus,
+        train("vae", "--corpus", corpus, "--size", a.size, *start("vae")),
+        ("cache", None, "train.cache", ["--corpus", corpus, "--vae", kept["vae"], "--audio", alone, "--out", at("cache"), *many]),
+        train("flow", "--cache", at("cache"), "--vae", kept["vae"], "--size", a.size, *start("flow")),
+        train("flow-audio", "--cache", at("cache"), "--vae", kept["vae"], "--init", kept["flow"], "--end-to-end", alone, "--corpus", corpus,
               "--live", "4", "--batch", "16", "--lr", "3e-4"),
         ("relisten", None, "train.cache", ["--latents-of", at("cache"), "--corpus", corpus, "--audio", flow, "--out", heard, *many]),
-        train("student", "student.pt", "--cache", heard, "--vae", at("vae.pt"), "--flow", flow),
-        train("decoder", "vae-fine.pt", "--corpus", corpus, "--cache", heard, "--vae", at("vae.pt"), "--flow", flow, "--student", at("student.pt")),
+        train("student", "--cache", heard, "--vae", kept["vae"], "--flow", flow),
+        train("decoder", "--corpus", corpus, "--cache", heard, "--vae", kept["vae"], "--flow", flow, "--student", kept["student"]),
     ]
     out.append(("curves", None, "train.curves", [checkpoint + ".jsonl" for name, checkpoint, *_ in out if name in TRAINED] + ["--out", at("curves")]))
     for kind, extra in (("f32", []), ("f16", ["--half"])):
-        out.append((f"export-{kind}", None, "export", ["--corpus", corpus, "--audio", flow, "--vae", at("vae-fine.pt"), "--flow", flow, "--student", at("student.pt"),
+        out.append((f"export-{kind}", None, "export", ["--corpus", corpus, "--audio", flow, "--vae", kept["decoder"], "--flow", flow, "--student", kept["student"],
                                                        "--name", a.size, "--out", os.path.join(a.work, f"{a.size}-{kind}.safetensors"), *extra]))
     return out
 
@@ -93,10 +95,11 @@ def main():
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--workers", type=int, default=1, help="processes of a stage")
+    parser.add_argument("--processes", type=int, help="processes of the stages that train nothing; default --workers")
     parser.add_argument("--keep-minutes", type=float, default=4.0, help="time between checkpoints")
     parser.add_argument("--start", help="bundle of the same size whose weights to start from")
     parser.add_argument("--more", type=pair, action="append", default=[], metavar="STAGE:ARGUMENTS", help="further arguments of a stage")
-    parser.add_argument("--until", choices=TRAINED, help="stop after this stage")
+    parser.add_argument("--until", metavar="STAGE", help="stop after this stage")
     parser.add_argument("--list", action="store_true", help="print the commands and stop")
     a = parser.parse_args()
     runs = os.path.join(a.work, "runs")

@@ -13,11 +13,11 @@ import glob
 import os
 
 import numpy as np
-import soundfile
 import torch
 from scipy.signal import resample_poly
 from torch import nn
 
+from .. import wav
 from ..nets.audio import FRAME_SAMPLES, AudioEncoder
 from . import common
 from .common import mixed
@@ -66,8 +66,8 @@ def load(files):
     """Mono float32 at 24 kHz."""
     out = []
     for path in files:
-        wave, rate = soundfile.read(path, dtype="float32", always_2d=True)
-        out.append(resample_poly(wave.mean(1), RATE, rate).astype(np.float32))
+        wave, rate = wav.read(path)
+        out.append(resample_poly(wave, RATE, rate).astype(np.float32))
     return out
 
 

@@ -78,6 +78,13 @@ def load(path, **kw):
     return torch.load(path, weights_only=True, map_location="cpu", **kw)
 
 
+def light(state):
+    """A checkpoint as it travels: averaged weights in f16, no optimiser and no memory of the trainer."""
+    half = lambda kept: {k: v.half() if v.is_floating_point() else v for k, v in kept.items()}
+    beside = {name: {"ema": half(kept["ema"])} for name, kept in state.get("beside", {}).items()}
+    return {k: v for k, v in state.items() if k not in ("net", "optim", "memory")} | {"ema": half(state["ema"]), "beside": beside}
+
+
 def config(out, args):
     """Writes the arguments of a training to OUT.json; says which of them differ from those it began with."""
     path, given = out + ".json", {k: v for k, v in vars(args).items() if k != "resume"}

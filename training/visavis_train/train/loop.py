@@ -23,7 +23,8 @@ class Loop:
 
     Each step's random numbers follow from (seed, process, step) alone, and a checkpoint holds all else that a step depends on: stopped and
     resumed, a training gives the weights of an uninterrupted one. `beside`: {name: module} trained along, `averages` theirs. `memory`: an
-    object with `state_dict` and `load_state_dict`, kept in the checkpoint too. `kept`: what else a checkpoint holds."""
+    object with `state_dict` and `load_state_dict`, kept in the checkpoint too. `kept`: what else a checkpoint holds. A checkpoint of
+    `common.light`, averaged weights alone, is gone on with too, the optimiser beginning anew."""
 
     def __init__(self, team, net, args, warmup=200, average=0.998, beside=None, memory=None, **kept):
         self.team, self.net, self.args, self.warmup, self.memory, self.kept = team, net, args, warmup, memory, kept
@@ -32,13 +33,16 @@ class Loop:
         self.optim = common.optimiser(self.trained, args.lr)
         state = common.load(args.out) if args.resume else None
         if state:
-            net.load_state_dict(state["net"])
-            self.optim.load_state_dict(state["optim"])
+            weights = lambda kept: kept.get("net", kept["ema"])
+            net.load_state_dict(weights(state))
             self.step, self.spent, self.steps = state["step"], state["elapsed"], self.steps or state["steps"]
             for name, module in self.beside.items():
-                module.load_state_dict(state["beside"][name]["net"])
-            if memory:
+                module.load_state_dict(weights(state["beside"][name]))
+            if "optim" in state:
+                self.optim.load_state_dict(state["optim"])
+            if memory and "memory" in state:
                 memory.load_state_dict(state["memory"])
+        self.first, self.cold = self.step, self.step if state and "optim" not in state else 0
         self.ema = common.Ema(net, average)
         self.averages = {name: common.Ema(module, average) for name, module in self.beside.items()}
         if state:
@@ -76,11 +80,12 @@ class Loop:
 
     def _probe(self):
         """`--minutes`: fixes the number of steps once their time is known."""
-        if self.step in PROBE and next(self.net.parameters()).is_cuda:
+        done = self.step - self.first
+        if done in PROBE and next(self.net.parameters()).is_cuda:
             torch.cuda.synchronize()
-        if self.step == PROBE[0]:
+        if done == PROBE[0]:
             self.probed = time.monotonic()
-        elif self.step == PROBE[1]:
+        elif done == PROBE[1]:
             pace = (time.monotonic() - self.probed) / (PROBE[1] - PROBE[0])
             self.steps = self.team.agree(max(self.step, self.step + int((60 * self.args.minutes - self.elapsed) / pace)))
 
@@ -93,7 +98,7 @@ class Loop:
 
     def update(self, loss, /, **parts):
         """One step down `loss`; `parts` are what the next line of the log averages."""
-        common.set_rate(self.optim, common.rate(self.args.lr, self.step, self.progress, self.warmup))
+        common.set_rate(self.optim, common.rate(self.args.lr, self.step - self.cold, self.progress, self.warmup))
         self.optim.zero_grad()
         loss.backward()
         self.stopping = self.team.average(self.trained, self.asked)

@@ -174,7 +174,7 @@ def main():
                 gaze_guidance=args.gaze_guidance, temperature=args.temperature, **kept)
     rollouts, tau = Rollouts(windows, vae, mean, std), torch.full((1, 1), args.tau_history, device=device)
     for step in loop:
-        if step % args.reuse == 0:
+        if step % args.reuse == 0 or not memory.count:
             gaze = bool(torch.rand(1) < 0.6)
             own = team.draw(args.seed, step) < args.own * min(1.0, step / 200)  # the same kind of pass in all processes: none waits for the dearer one
             if own:
