@@ -39,8 +39,12 @@ fn stages(c: &mut Criterion) {
             for sampler in [Sampler::Midpoint(4), Sampler::Single] {
                 let mut group = c.benchmark_group(format!("{name}/{scheme}/{sampler}"));
                 for threads in [1, 2] {
-                    let options =
-                        SessionOptions { sampler, threads, anchoring: Anchoring::Never, ..SessionOptions::default() };
+                    let options = SessionOptions {
+                        sampler,
+                        threads,
+                        diagnostics: Anchoring::Never.into(),
+                        ..SessionOptions::default()
+                    };
                     let mut session = engine.session(options).expect("a session");
                     blocks(&mut session, &samples, 100, None);
                     for (i, stage) in STAGES.iter().enumerate() {

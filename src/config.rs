@@ -2,8 +2,8 @@
 //!
 //! Stored as JSON under the key `visavis` of the safetensors metadata; written by `training/visavis_train/export.py`.
 
-use crate::kernels::Scheme;
-use crate::pose::Rig;
+use crate::rig::Rig;
+use crate::scheme::Scheme;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -4,23 +4,19 @@
 mod round_trip;
 
 use crate::audio::{AudioEncoder, AudioWeights};
-use crate::bundle::{AudioSource, BundleFile, LoadMode, Tensors};
+use crate::bundle::{AudioSource, BundleFile, IDLE_FRAMES, IDLE_LATENTS, LoadMode, Tensors};
 use crate::config::Config;
 use crate::error::{Error, ErrorKind, Result};
 use crate::flow::{ConditionLayout, FlowNet, Nets, reference_times, student_times};
-use crate::frame::{BLOCK_FRAMES, Sampler};
+use crate::frame::{BLOCK_FRAMES, Sampler, feature_count};
 use crate::kernels::{Exec, Kernels, KvDtype, Limits};
-use crate::pose::{Rig, feature_count};
+use crate::rig::Rig;
 use crate::vae::{Decoder, Encoder};
 use std::path::Path;
 use std::sync::Arc;
 
 /// Most frames of an idle clip: every session starts by going through them.
 const MAX_IDLE_FRAMES: usize = 3600;
-/// The idle clip's frames, in bundles as they are exported.
-pub(crate) const IDLE_FRAMES: &str = "idle.frames";
-/// Its latents, in their place in quantised bundles.
-pub(crate) const IDLE_LATENTS: &str = "idle.latents";
 
 /// Which networks of a bundle an engine holds: what no session will use need not take memory, nor time to load.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

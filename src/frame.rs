@@ -18,6 +18,11 @@ pub const ROOT_CHANNELS: usize = 3;
 /// Feature channels of a joint: 12 icosahedron vertices of 3 coordinates.
 pub const JOINT_CHANNELS: usize = 36;
 
+/// Length F of the feature vector of `joints` joints: `3 + 36 joints`.
+pub const fn feature_count(joints: usize) -> usize {
+    ROOT_CHANNELS + JOINT_CHANNELS * joints
+}
+
 /// A joint's place in space: metres, right-handed, Y up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Transform {

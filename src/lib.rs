@@ -45,6 +45,8 @@ mod par;
 mod pose;
 #[cfg(feature = "quant")]
 mod quant;
+mod rig;
+mod scheme;
 mod session;
 mod user;
 mod vae;
@@ -55,8 +57,8 @@ pub use engine::{Engine, Networks};
 pub use error::{Error, ErrorKind, Result};
 pub use frame::{BLOCK_FRAMES, FPS, Frame, Root, SAMPLE_RATE, Sampler, Transform};
 pub use glam;
-pub use pose::{Joint, Rig};
-pub use session::{Budget, Decision, GazeControl, Governor, Hold, Plan, Session, SessionOptions, Team};
+pub use rig::{Joint, Rig};
+pub use session::{Budget, Decision, Governor, Hold, Plan, Session, SessionOptions, Team};
 
 /// What a session counts and measures ([`Session::stats`]).
 pub mod stats {

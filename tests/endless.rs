@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Inputs, motion, poll_blocks, run, tiny};
-use visavis::internals::session::{Anchoring, Probe};
+use visavis::internals::session::{Anchoring, Diagnostics, Probe};
 use visavis::{Frame, SessionOptions};
 
 /// Largest step of any joint from one frame to the next, metres.
@@ -39,7 +39,8 @@ fn ten_minutes_in_circles() {
     let blocks = 4500;
     let inputs = Inputs::circling(common::block_seconds(blocks), 24_000);
     let session = |anchoring| {
-        let options = SessionOptions { anchoring, gaze: Some(0.8), ..Default::default() };
+        let options =
+            SessionOptions { diagnostics: Diagnostics::from(anchoring), gaze: Some(0.8), ..Default::default() };
         tiny().session(options).unwrap()
     };
     let drive = |anchoring| {
@@ -74,7 +75,7 @@ fn ten_minutes_in_circles() {
 #[test]
 fn re_anchoring_takes_effect_when_it_says() {
     let inputs = Inputs::circling(common::block_seconds(60), 24_000);
-    let options = |anchoring| SessionOptions { anchoring, ..Default::default() };
+    let options = |anchoring| SessionOptions { diagnostics: Diagnostics::from(anchoring), ..Default::default() };
     let plain = motion(options(Anchoring::Never), &inputs, 60);
     let anchored = motion(options(Anchoring::Every(30)), &inputs, 60);
     let first = plain.iter().zip(&anchored).position(|(a, b)| a.global != b.global).expect("it has an effect");

@@ -5,7 +5,8 @@ mod common;
 use common::{Inputs, golden_path, run, tiny};
 use std::sync::Arc;
 use visavis::internals::config::{GazeConfig, GazeCurve};
-use visavis::{BundleFile, Engine, ErrorKind, Frame, GazeControl, Sampler, SessionOptions};
+use visavis::internals::session::{Diagnostics, GazeControl};
+use visavis::{BundleFile, Engine, ErrorKind, Frame, Sampler, SessionOptions};
 
 const BLOCKS: usize = 12;
 
@@ -17,6 +18,10 @@ fn gaze() -> GazeConfig {
         levels: vec![0.25],
         seconds: 10.0,
     }
+}
+
+fn control(gaze_control: GazeControl) -> Diagnostics {
+    Diagnostics { gaze_control, ..Default::default() }
 }
 
 fn with(gaze: &GazeConfig) -> visavis::Result<Arc<Engine>> {
@@ -41,7 +46,10 @@ fn targets_and_free_gaze_are_what_the_calibration_says() {
     ];
     for (sampler, wanted, value, gaze_control) in cases {
         let a = motion(&calibrated, SessionOptions { sampler, gaze: wanted, ..Default::default() });
-        let b = motion(&plain, SessionOptions { sampler, gaze: Some(value), gaze_control, ..Default::default() });
+        let b = motion(
+            &plain,
+            SessionOptions { sampler, gaze: Some(value), diagnostics: control(gaze_control), ..Default::default() },
+        );
         assert_eq!(a, b, "{sampler}, target {wanted:?}");
     }
 }
@@ -49,7 +57,8 @@ fn targets_and_free_gaze_are_what_the_calibration_says() {
 #[test]
 fn unguided_is_neither_guided_nor_absent() {
     let engine = tiny();
-    let options = |gaze, gaze_control| SessionOptions { gaze, gaze_control, ..Default::default() };
+    let options =
+        |gaze, gaze_control| SessionOptions { gaze, diagnostics: control(gaze_control), ..Default::default() };
     let unguided = motion(&engine, options(Some(0.3), GazeControl::Unguided));
     assert_ne!(unguided, motion(&engine, options(Some(0.3), GazeControl::Channel)));
     assert_ne!(unguided, motion(&engine, options(None, GazeControl::Channel)));

@@ -20,7 +20,7 @@ fn clock(session: &Session, slow: f64) -> f64 {
 
 fn options() -> SessionOptions {
     let governor = Governor::Budget(Budget { milliseconds: 100.0, coarse: false });
-    SessionOptions { governor, gaze: Some(0.8), anchoring: Anchoring::Every(40), ..Default::default() }
+    SessionOptions { governor, gaze: Some(0.8), diagnostics: Anchoring::Every(40).into(), ..Default::default() }
 }
 
 /// Polls `blocks` blocks and reports their times; returns the frames and the number of late blocks.

@@ -65,7 +65,7 @@ fn engines_and_sessions_leave_nothing_behind() {
         let options = SessionOptions {
             threads: 1 + usize::from(i % 4 == 3),
             sampler: samplers[i % samplers.len()],
-            anchoring: Anchoring::Every(2),
+            diagnostics: Anchoring::Every(2).into(),
             ..Default::default()
         };
         let mut session = engine.session(options).expect("a session");

@@ -4,20 +4,24 @@ mod common;
 
 use common::{Inputs, poll_blocks, tiny};
 use visavis::internals::nn::PERIOD;
-use visavis::internals::session::Anchoring;
+use visavis::internals::session::{Anchoring, Diagnostics};
 use visavis::{BLOCK_FRAMES, FPS, Frame, Sampler, Session, SessionOptions};
 
 const DAY: u64 = 24 * 3600 * FPS as u64 / BLOCK_FRAMES as u64;
 const BLOCKS: usize = 60;
 
 /// The same noise and the same inputs, in a session that starts at `first_block`.
+fn starting(first_block: u64) -> SessionOptions {
+    SessionOptions { diagnostics: Diagnostics { first_block, ..Default::default() }, ..Default::default() }
+}
+
 fn motion(first_block: u64, sampler: Sampler) -> (Vec<Frame>, Session) {
     let engine = tiny();
     let latent = engine.config().vae.latent;
     let tokens = engine.idle_blocks() + BLOCKS;
     let noise: Vec<f32> = (0..tokens * latent).map(|i| ((i * i) as f32 * 0.7).sin()).collect();
-    let options =
-        SessionOptions { first_block, sampler, gaze: Some(0.8), anchoring: Anchoring::Every(20), ..Default::default() };
+    let diagnostics = Diagnostics { first_block, anchoring: Anchoring::Every(20), ..Default::default() };
+    let options = SessionOptions { sampler, gaze: Some(0.8), diagnostics, ..Default::default() };
     let mut session = engine.session(options).unwrap();
     session.reset_with_noise(noise).unwrap();
     let start = session.next_due();
@@ -76,7 +80,7 @@ fn a_day_later_motion_is_the_same() {
 /// Seeded noise is as good after a day, and the head is still found.
 #[test]
 fn a_day_later_counters_go_on() {
-    let mut session = tiny().session(SessionOptions { first_block: DAY, ..Default::default() }).unwrap();
+    let mut session = tiny().session(starting(DAY)).unwrap();
     let mut early = tiny().session(SessionOptions::default()).unwrap();
     assert!(session.poll(0.0).unwrap().is_none(), "not due yet");
     session.push_user_head(glam::Vec3::new(0.0, 1.6, 2.0), 86_400.0).unwrap();
@@ -84,6 +88,6 @@ fn a_day_later_counters_go_on() {
     assert!(late[4].gaze.is_some(), "the head is seen");
     assert_ne!(late[40].global, early[40].global, "other tokens, other noise");
     assert!(late.iter().flat_map(|f| &f.global).all(|t| t.position.is_finite()));
-    let kind = tiny().session(SessionOptions { first_block: 1 << 40, ..Default::default() }).unwrap_err().kind();
+    let kind = tiny().session(starting(1 << 40)).unwrap_err().kind();
     assert_eq!(kind, visavis::ErrorKind::Argument);
 }

@@ -10,7 +10,7 @@ use common::{Inputs, block_seconds, golden_path, run};
 use std::fmt::Write;
 use visavis::internals::audio::resample_to_24k;
 use visavis::internals::kernels::{Kernels, KvDtype};
-use visavis::internals::session::Anchoring;
+use visavis::internals::session::{Anchoring, Diagnostics};
 use visavis::{BundleFile, Engine, Frame, Sampler, SessionOptions};
 
 const BLOCKS: usize = 24;
@@ -48,9 +48,10 @@ impl Digest {
 
 /// Name, rate of the voices, options.
 fn cases() -> Vec<(&'static str, u32, SessionOptions)> {
-    let base = || SessionOptions { anchoring: Anchoring::Every(6), ..Default::default() };
+    let base = || SessionOptions { diagnostics: Anchoring::Every(6).into(), ..Default::default() };
     let gaze = |g| SessionOptions { gaze: Some(g), ..base() };
     let sampler = |sampler| SessionOptions { sampler, ..gaze(0.8) };
+    let wide = Diagnostics { cache: KvDtype::F32, ..Anchoring::Every(6).into() };
     vec![
         ("free gaze, 24 kHz", 24_000, base()),
         ("gaze 0.8, 48 kHz", 48_000, gaze(0.8)),
@@ -60,7 +61,7 @@ fn cases() -> Vec<(&'static str, u32, SessionOptions)> {
         (
             "midpoint1, 22.05 kHz, f32 cache",
             22_050,
-            SessionOptions { cache: KvDtype::F32, ..sampler(Sampler::Midpoint(1)) },
+            SessionOptions { diagnostics: wide, ..sampler(Sampler::Midpoint(1)) },
         ),
         ("euler:5, 96 kHz", 96_000, sampler(Sampler::Euler(5))),
         ("single, 48 kHz", 48_000, sampler(Sampler::Single)),

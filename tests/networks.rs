@@ -7,7 +7,7 @@ use std::sync::Arc;
 use visavis::internals::config::CleanHistory;
 use visavis::internals::kernels::{Kernels, Scheme};
 use visavis::internals::quant::{Options, quantise};
-use visavis::internals::session::{Anchoring, HistoryTime};
+use visavis::internals::session::{Anchoring, Diagnostics, HistoryTime};
 use visavis::{BundleFile, Engine, ErrorKind, Networks, Sampler, SessionOptions};
 
 fn load(networks: Networks) -> visavis::Result<Arc<Engine>> {
@@ -29,7 +29,7 @@ fn what_is_left_makes_the_same_motion_in_less_memory() {
         assert!(part.weight_bytes() < whole.weight_bytes());
         assert_eq!(part.block_bytes(sampler), whole.block_bytes(sampler));
         // A round of re-anchoring takes fewer blocks where there are fewer caches to renew.
-        let options = SessionOptions { sampler, anchoring: Anchoring::Never, ..Default::default() };
+        let options = SessionOptions { sampler, diagnostics: Anchoring::Never.into(), ..Default::default() };
         let [mut a, mut b] = [&part, &whole].map(|engine| engine.session(options.clone()).expect("session"));
         let (a_motion, b_motion) = (common::poll_blocks(&mut a, 40), common::poll_blocks(&mut b, 40));
         assert!(a_motion == b_motion, "{networks:?}");
@@ -55,7 +55,7 @@ fn tables_of_flow_times_make_the_same_motion_without_their_weights() {
     let (whole, lean) = (load(true, true), load(false, false));
     assert!(lean.weight_bytes() < whole.weight_bytes());
     for sampler in [Sampler::Midpoint(4), Sampler::Midpoint(1), Sampler::Euler(4), Sampler::Single] {
-        let options = SessionOptions { sampler, anchoring: Anchoring::Never, ..Default::default() };
+        let options = SessionOptions { sampler, diagnostics: Anchoring::Never.into(), ..Default::default() };
         let [mut a, mut b] = [&lean, &whole].map(|engine| engine.session(options.clone()).expect("session"));
         let blocks = |session: &mut _| {
             let mut frames = common::poll_blocks(session, 12);
@@ -74,7 +74,7 @@ fn flow_times_outside_the_table_take_the_weights() {
     let clean = HistoryTime::Clean(CleanHistory { tau: 0.83, from: 0.4 });
     for options in [
         SessionOptions { sampler: Sampler::Euler(3), ..Default::default() },
-        SessionOptions { history: clean, ..Default::default() },
+        SessionOptions { diagnostics: Diagnostics { history: clean, ..Default::default() }, ..Default::default() },
     ] {
         let refused = lean.session(options.clone()).expect_err("refused");
         assert_eq!(refused.kind(), ErrorKind::Argument);
@@ -90,7 +90,8 @@ fn flow_times_outside_the_table_take_the_weights() {
 fn it_takes_the_encoder_to_re_anchor() {
     for encoder in [true, false] {
         let engine = load(Networks { encoder, reference: false, ..Networks::default() }).expect("it loads");
-        let options = SessionOptions { sampler: Sampler::Single, anchoring: Anchoring::Every(4), ..Default::default() };
+        let options =
+            SessionOptions { sampler: Sampler::Single, diagnostics: Anchoring::Every(4).into(), ..Default::default() };
         let mut session = engine.session(options).expect("session");
         common::poll_blocks(&mut session, 40);
         assert_eq!(session.stats().anchorings > 0, encoder);

@@ -9,7 +9,7 @@ use common::{Golden, max_error, tiny};
 use std::collections::BTreeMap;
 use visavis::internals::config::CleanHistory;
 use visavis::internals::kernels::KvDtype;
-use visavis::internals::session::{Anchoring, HistoryTime, Probe};
+use visavis::internals::session::{Anchoring, Diagnostics, HistoryTime, Probe};
 use visavis::{FPS, Sampler, SessionOptions};
 
 const TOLERANCE: f32 = 1e-4;
@@ -26,14 +26,14 @@ impl Probe for Stages {
 
 /// Runs the golden file's inputs and noise through a session.
 fn stages(golden: &Golden, sampler: Sampler, cache: KvDtype) -> BTreeMap<&'static str, Vec<f32>> {
-    stages_with(golden, SessionOptions { sampler, cache, ..Default::default() })
+    stages_with(golden, sampler, Diagnostics { cache, ..Default::default() })
 }
 
-fn stages_with(golden: &Golden, options: SessionOptions) -> BTreeMap<&'static str, Vec<f32>> {
+fn stages_with(golden: &Golden, sampler: Sampler, given: Diagnostics) -> BTreeMap<&'static str, Vec<f32>> {
     let engine = tiny();
     let gaze = Some(golden.values("gaze")[0]);
-    let options =
-        SessionOptions { gaze, anchoring: Anchoring::Never, bridge: false, stance: false, guard: false, ..options };
+    let diagnostics = Diagnostics { anchoring: Anchoring::Never, bridge: false, ..given };
+    let options = SessionOptions { sampler, gaze, stance: false, guard: false, diagnostics, ..Default::default() };
     let mut session = engine.session(options).expect("session");
     let mut noise = golden.values("eps_idle");
     noise.extend(golden.values("eps"));
@@ -107,8 +107,8 @@ fn cheaper_samplers_equal_pytorch() {
 fn clean_history_equals_pytorch() {
     let golden = Golden::load();
     let history = HistoryTime::Clean(CleanHistory { tau: 0.9, from: 0.3 });
-    let options = SessionOptions { cache: KvDtype::F32, history, ..Default::default() };
-    let ours = stages_with(&golden, options);
+    let clean = Diagnostics { cache: KvDtype::F32, history, ..Default::default() };
+    let ours = stages_with(&golden, Sampler::Midpoint(4), clean);
     let error = max_error(&ours["latents"], &golden.values("latents.clean"));
     println!("clean history: {error:e}");
     assert!(error < TOLERANCE, "latents differ by {error}");

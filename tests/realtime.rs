@@ -64,7 +64,7 @@ fn a_running_session_does_not_allocate() {
     let inputs = Inputs::circling(20.0, 48_000);
     let engines = [tiny(), tiny_in(Scheme::F16), tiny_in(Scheme::I8), tiny_in(Scheme::I4)];
     for (engine, threads) in engines.iter().flat_map(|e| [(e, 1), (e, 2)]) {
-        let options = SessionOptions { threads, anchoring: Anchoring::Every(10), ..Default::default() };
+        let options = SessionOptions { threads, diagnostics: Anchoring::Every(10).into(), ..Default::default() };
         let mut session = engine.session(options).unwrap();
         let per_block = 6400;
         let (mut agent, mut user) = (inputs.agent.chunks(per_block), inputs.user.chunks(per_block));
@@ -119,7 +119,8 @@ fn a_running_session_does_not_allocate() {
         let mut sessions: Vec<_> = (0..5)
             .map(|seed| {
                 let gaze = (seed == 1).then_some(0.5);
-                let options = SessionOptions { seed, gaze, anchoring: Anchoring::Every(10), ..Default::default() };
+                let options =
+                    SessionOptions { seed, gaze, diagnostics: Anchoring::Every(10).into(), ..Default::default() };
                 let mut session = engine.session(options).unwrap();
                 // Of some, both voices are heard, of some, one.
                 let second = inputs.rate as usize;

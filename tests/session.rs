@@ -4,6 +4,7 @@ mod common;
 
 use common::{Inputs, motion, poll_blocks, run, tiny};
 use glam::Vec3;
+use visavis::internals::session::Diagnostics;
 use visavis::{BLOCK_FRAMES, ErrorKind, FPS, Frame, Sampler, Session, SessionOptions};
 
 const BLOCKS: usize = 30;
@@ -129,7 +130,8 @@ fn seeds_and_gaze_targets_matter() {
     assert!(differs(SessionOptions { seed: 1, ..options() }));
     assert!(differs(SessionOptions { gaze: Some(0.0), ..options() }));
     assert!(differs(SessionOptions { stance: false, ..options() }));
-    assert!(differs(SessionOptions { bridge: false, ..options() }));
+    let diagnostics = Diagnostics { bridge: false, ..Default::default() };
+    assert!(differs(SessionOptions { diagnostics, ..options() }));
     assert!(differs(SessionOptions { gaze: None, ..options() }));
     assert!(differs(SessionOptions { sampler: Sampler::Midpoint(2), ..options() }));
     assert!(differs(SessionOptions { guidance: Some(3.0), ..options() }));

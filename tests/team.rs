@@ -5,21 +5,22 @@ mod common;
 use common::{Inputs, tiny, tiny_in};
 use std::sync::Arc;
 use visavis::internals::kernels::Scheme;
-use visavis::internals::session::Anchoring;
+use visavis::internals::session::{Anchoring, Diagnostics};
 use visavis::{Budget, Engine, ErrorKind, Frame, Governor, Sampler, Session, SessionOptions};
 
 const BLOCKS: usize = 60;
 
 /// Six conversations that differ in all that may differ; most are at times alike.
 fn sessions(engine: &Arc<Engine>, inputs: &Inputs) -> Vec<Session> {
-    let usual = SessionOptions { anchoring: Anchoring::Every(12), ..Default::default() };
+    let usual = SessionOptions { diagnostics: Anchoring::Every(12).into(), ..Default::default() };
+    let late = Diagnostics { first_block: 1000, ..usual.diagnostics.clone() };
     let options = [
         usual.clone(),
         SessionOptions { seed: 1, gaze: Some(0.7), guidance: Some(2.0), ..usual.clone() },
-        SessionOptions { seed: 2, first_block: 1000, temperature: Some(0.5), ..usual.clone() },
+        SessionOptions { seed: 2, diagnostics: late, temperature: Some(0.5), ..usual.clone() },
         SessionOptions { seed: 3, sampler: Sampler::Single, ..usual.clone() },
         SessionOptions { seed: 4, sampler: Sampler::Euler(3), ..usual.clone() },
-        SessionOptions { seed: 5, sampler: Sampler::Single, anchoring: Anchoring::Never, ..usual },
+        SessionOptions { seed: 5, sampler: Sampler::Single, diagnostics: Anchoring::Never.into(), ..usual },
     ];
     let session = |options: SessionOptions| {
         let mut session = engine.session(options).expect("session");

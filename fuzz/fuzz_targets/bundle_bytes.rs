@@ -2,8 +2,8 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use visavis::{BundleFile, Engine, Sampler, SessionOptions};
 use visavis::internals::bundle::Contents;
+use visavis::{BundleFile, Engine, Sampler, SessionOptions};
 use visavis_fuzz::seed_small;
 
 fuzz_target!(init: seed_small(), |data: &[u8]| {

@@ -3,8 +3,8 @@
 
 use libfuzzer_sys::fuzz_target;
 use visavis::ErrorKind;
-use visavis_tools::offline::{Conversation, for_session};
 use visavis_tools::offline::UserPath;
+use visavis_tools::offline::{Conversation, for_session};
 
 fuzz_target!(|data: &[u8]| {
     let Ok(text) = std::str::from_utf8(data) else { return };

@@ -6,8 +6,8 @@ use arbitrary::{Arbitrary, Unstructured};
 use glam::Vec3;
 use libfuzzer_sys::fuzz_target;
 use std::cell::RefCell;
+use visavis::internals::session::{Anchoring, Diagnostics};
 use visavis::{Budget, ErrorKind, Governor, Root, Sampler, Session, SessionOptions};
-use visavis::internals::session::Anchoring;
 use visavis_fuzz::{engine, student};
 
 thread_local! {
@@ -93,10 +93,13 @@ fuzz_target!(|data: &[u8]| {
         guidance: o.weights,
         temperature: o.temperature,
         start: Root { x: o.start[0], z: o.start[1], yaw: o.start[2] },
-        anchoring: if o.anchoring == 0 { Anchoring::Bundle } else { Anchoring::Every(u32::from(o.anchoring) - 1) },
         governor: governor(o.budget),
         stance: o.stance,
-        first_block: u64::from(o.first_block),
+        diagnostics: Diagnostics {
+            anchoring: if o.anchoring == 0 { Anchoring::Bundle } else { Anchoring::Every(u32::from(o.anchoring) - 1) },
+            first_block: u64::from(o.first_block),
+            ..Diagnostics::default()
+        },
         ..SessionOptions::default()
     };
     let mut session = match engine().session(options) {

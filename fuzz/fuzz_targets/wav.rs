@@ -2,8 +2,8 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use visavis_tools::offline::Wav;
 use visavis::ErrorKind;
+use visavis_tools::offline::Wav;
 
 fuzz_target!(|data: &[u8]| match Wav::parse(data) {
     Ok(wav) => {

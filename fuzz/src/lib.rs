@@ -4,10 +4,10 @@ use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, OnceLock};
-use visavis::{BundleFile, Engine, Networks};
 use visavis::internals::bundle::CONFIG_KEY;
 use visavis::internals::kernels::Kernels;
 use visavis::internals::pose::feature_count;
+use visavis::{BundleFile, Engine, Networks};
 
 /// The bundle of the tests: the real networks with few channels and random weights.
 pub const TINY: &[u8] = include_bytes!("../../tests/goldens/tiny.safetensors");

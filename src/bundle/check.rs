@@ -3,12 +3,12 @@
 //! Weights are bounded by the file's own size, since each tensor must have the shape that the config gives. Caches and scratch are not,
 //! so what a session would take is counted and must not exceed [`MAX_SESSION`].
 
-use super::file::invalid;
+use super::invalid;
 use crate::audio::check_audio_config;
 use crate::config::{Config, GazeConfig, GazeCurve};
 use crate::error::Result;
+use crate::frame::feature_count;
 use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES};
-use crate::pose::feature_count;
 
 /// Most memory that a session may take for caches and scratch, bytes. Sessions of the shipped model take 20 MB, those of a
 /// model of the size in the SARAH paper 60 MB.

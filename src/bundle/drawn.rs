@@ -1,7 +1,6 @@
 //! Tensors that are drawn from their names instead of read: networks of sizes for which there is no bundle, to measure their speed.
 
-use super::{SMALL, StoredData, StoredWeights};
-use crate::engine::IDLE_LATENTS;
+use super::{IDLE_LATENTS, SMALL, StoredData, StoredWeights};
 use crate::frame::BLOCK_FRAMES;
 use crate::kernels::{I4_GROUP, Scheme};
 use half::f16;

@@ -1,7 +1,6 @@
 //! The bytes of a bundle, from a mapped file or from memory.
 
-use super::{CONFIG_KEY, Tensors, check};
-use crate::config::{Config, FORMAT};
+use super::{CONFIG_KEY, corrupt, invalid};
 use crate::error::{Error, ErrorKind, Result};
 #[cfg(not(target_os = "android"))]
 use memmap2::Mmap;
@@ -9,8 +8,6 @@ use safetensors::SafeTensors;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-/// Largest header that is parsed, bytes: metadata of thousands of tensors take well under one mebibyte.
-const MAX_HEADER: u64 = 4 << 20;
 /// Longest file that is copied to memory, bytes.
 const MAX_COPY: u64 = 4 << 30;
 
@@ -117,7 +114,7 @@ impl<'a> BundleFile<'a> {
         self.len() == 0
     }
 
-    fn as_slice(&self) -> &[u8] {
+    pub(super) fn as_slice(&self) -> &[u8] {
         match &self.bytes {
             #[cfg(not(target_os = "android"))]
             Bytes::Mapped(map) => map,
@@ -140,31 +137,6 @@ impl<'a> BundleFile<'a> {
             // SAFETY: nobody writes through the map, so its pages hold what the file holds, and are read from it again.
             let _ = unsafe { map.unchecked_advise_range(memmap2::UncheckedAdvice::DontNeed, from, part.len()) };
         }
-    }
-
-    /// Parses the container and the config, and checks both.
-    ///
-    /// # Errors
-    /// [`ErrorKind::BundleCorrupt`], [`ErrorKind::BundleVersion`] or [`ErrorKind::BundleInvalid`], naming the file.
-    pub fn parse(&self) -> Result<(Config, Tensors<'_>)> {
-        self.parse_inner().map_err(|e| e.with_path(&self.path))
-    }
-
-    fn parse_inner(&self) -> Result<(Config, Tensors<'_>)> {
-        let bytes = self.as_slice();
-        let header = bytes.first_chunk::<8>().map(|b| u64::from_le_bytes(*b));
-        match header {
-            None => return Err(corrupt("shorter than a safetensors header; fetch the bundle again")),
-            Some(n) if n > MAX_HEADER || n > bytes.len() as u64 => {
-                return Err(corrupt("not a safetensors file, or cut off inside its header; fetch the bundle again"));
-            }
-            Some(_) => {}
-        }
-        let (json, tensors) = self.raw()?;
-        let config = parse_config(&json)?;
-        check::config(&config)?;
-        let quantisation = config.quantisation.clone();
-        Ok((config, Tensors::new(self, tensors, quantisation)))
     }
 
     /// The config as JSON and the container; neither has been looked into.
@@ -198,29 +170,4 @@ fn contents(file: &File, offset: u64, length: usize) -> std::io::Result<Bytes<'s
     let mut bytes = vec![0; length];
     std::os::unix::fs::FileExt::read_exact_at(file, &mut bytes, offset)?;
     Ok(Bytes::Owned(bytes))
-}
-
-fn parse_config(json: &str) -> Result<Config> {
-    #[derive(serde::Deserialize)]
-    struct Version {
-        format: u32,
-    }
-    let unreadable = |e| invalid(format!("the bundle's config cannot be read: {e}; export the bundle again"));
-    let version: Version = serde_json::from_str(json).map_err(unreadable)?;
-    if version.format != FORMAT {
-        let advice = if version.format > FORMAT { "update visavis" } else { "export the bundle again" };
-        return Err(Error::new(
-            ErrorKind::BundleVersion,
-            format!("bundle format {}, but this build reads format {FORMAT}; {advice}", version.format),
-        ));
-    }
-    serde_json::from_str(json).map_err(unreadable)
-}
-
-fn corrupt(message: impl Into<String>) -> Error {
-    Error::new(ErrorKind::BundleCorrupt, message)
-}
-
-pub(super) fn invalid(message: impl Into<String>) -> Error {
-    Error::new(ErrorKind::BundleInvalid, message)
 }

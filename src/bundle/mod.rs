@@ -8,6 +8,7 @@ mod check;
 mod contents;
 mod drawn;
 mod file;
+mod parse;
 mod read;
 mod rewrite;
 mod stored;
@@ -20,5 +21,19 @@ pub(crate) use rewrite::{Entry, assemble, entries, failed, floats};
 pub use stored::{SMALL, StoredData, StoredWeights, int16_activations};
 pub use tensors::Tensors;
 
+use crate::error::{Error, ErrorKind};
+
 /// Key of the config in the safetensors metadata.
 pub const CONFIG_KEY: &str = "visavis";
+/// The idle clip's frames, in bundles as they are exported.
+pub(crate) const IDLE_FRAMES: &str = "idle.frames";
+/// Its latents, in their place in quantised bundles.
+pub(crate) const IDLE_LATENTS: &str = "idle.latents";
+
+fn corrupt(message: impl Into<String>) -> Error {
+    Error::new(ErrorKind::BundleCorrupt, message)
+}
+
+fn invalid(message: impl Into<String>) -> Error {
+    Error::new(ErrorKind::BundleInvalid, message)
+}

@@ -1,6 +1,6 @@
 //! Reading the tensors of a bundle: floats as numbers, quantised weights where they lie.
 
-use super::file::invalid;
+use super::invalid;
 use super::rewrite::{entries, floats as bytes_of};
 use super::stored::pack;
 use super::tensors::Tensors;

@@ -1,7 +1,7 @@
 //! The tensors of a bundle: which there are, and which of them were asked for.
 
 use super::BundleFile;
-use super::file::invalid;
+use super::invalid;
 use super::rewrite::{Entry, assemble, failed};
 use crate::config::{Config, Quantisation};
 use crate::error::Result;

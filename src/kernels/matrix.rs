@@ -3,8 +3,9 @@
 use half::f16;
 
 use super::packed::{Buffer, FloatGeometry, MAX_PANELS, NR, Onward, TILE_COLS};
-use super::weights::{Scheme, WeightData, Weights};
+use super::weights::{WeightData, Weights};
 use super::{Kernels, Variant, matmul_f32_f16, matmul_f32_f32, matmul_i8dx_i4g, matmul_i8dx_i8cx};
+use crate::scheme::Scheme;
 
 /// A linear layer packed for one CPU level: weights, scales and bias.
 pub struct Matrix {

@@ -75,6 +75,7 @@ mod split_rows;
 mod testing;
 mod weights;
 
+pub use crate::scheme::Scheme;
 pub use activations::Activations;
 pub use attend::{KvCache, KvDtype, Span};
 pub use exec::{Exec, Limits, RowTable};
@@ -82,7 +83,7 @@ pub use level::Level;
 pub use linear::Epilogue;
 pub use matrix::Matrix;
 pub(crate) use weights::signed;
-pub use weights::{I4_GROUP, Scheme, WeightData, Weights};
+pub use weights::{I4_GROUP, WeightData, Weights};
 
 use crate::error::{Error, ErrorKind, Result};
 

@@ -7,18 +7,13 @@ use super::icosahedron::{decode, encode};
 use super::stance::Stance;
 use super::{Fit, Rig};
 use crate::error::{Error, ErrorKind, Result};
-use crate::frame::{BLOCK_FRAMES, Frame, JOINT_CHANNELS, ROOT_CHANNELS, Root, Transform};
+use crate::frame::{BLOCK_FRAMES, Frame, JOINT_CHANNELS, ROOT_CHANNELS, Root, Transform, feature_count};
 use crate::kernels::Kernels;
 use crate::par::Pool;
 use glam::{Mat3, Quat, Vec3};
 
 /// Joints that one thread makes transforms of at a time: as many as go through the polar factors side by side, twice.
 const LOT: usize = 32;
-
-/// Length F of the feature vector of `joints` joints: `3 + 36 joints`.
-pub const fn feature_count(joints: usize) -> usize {
-    ROOT_CHANNELS + JOINT_CHANNELS * joints
-}
 
 /// The root of a body whose hips are at `hips` (world): floor projection of the hips, heading of their +Z axis.
 ///

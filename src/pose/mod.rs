@@ -12,18 +12,17 @@ mod features;
 mod fit;
 mod gaze;
 mod guard;
-mod humanoid;
 pub mod icosahedron;
 pub mod openxr;
-mod rig;
 mod stance;
 #[cfg(any(test, feature = "internals"))]
 pub mod synthetic;
 
-pub use features::{Decoder, Encoder, feature_count, root_of};
+pub use crate::frame::feature_count;
+pub use crate::rig::{Joint, MAX_JOINTS, Rig};
+pub use features::{Decoder, Encoder, root_of};
 pub use fit::Fit;
 pub use gaze::gaze_score;
 pub use guard::{
     DEFECTIVE_HELD, DEFECTIVE_TRIPS_A_MINUTE, GuardStats, MAX_JOINT_SPEED, MAX_ROOT_SPEED, MAX_TURN_SPEED,
 };
-pub use rig::{Joint, MAX_JOINTS, Rig};

@@ -2,8 +2,9 @@
 
 use super::layers::Layer;
 use crate::bundle::{self, BundleFile, Entry, StoredWeights, assemble, failed, floats};
+use crate::bundle::{IDLE_FRAMES, IDLE_LATENTS};
 use crate::config::Quantisation;
-use crate::engine::{Engine, IDLE_FRAMES, IDLE_LATENTS};
+use crate::engine::Engine;
 use crate::error::Result;
 use crate::kernels::Scheme;
 use half::f16;

@@ -14,7 +14,9 @@
 //!
 //! A block that has no time for its share gives the round up; a new one starts when there is time.
 
-use super::options::{Anchoring, SessionOptions};
+use super::diagnostics::Anchoring;
+use super::governor::Share;
+use super::options::SessionOptions;
 use crate::engine::Engine;
 use crate::flow::Generator;
 use crate::frame::{BLOCK_FRAMES, Root};
@@ -35,17 +37,6 @@ enum Phase {
     Refill(usize, u64),
     /// The next block to decode.
     Decode(u64),
-}
-
-/// What a block does for re-anchoring.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Share {
-    /// Blocks that are encoded.
-    pub(super) encoded: u64,
-    /// Passes of eight tokens over a slot.
-    pub(super) passes: u64,
-    /// Blocks that are decoded.
-    pub(super) decoded: u64,
 }
 
 #[derive(Debug)]
@@ -78,7 +69,7 @@ pub(super) struct Anchor {
 
 impl Anchor {
     pub(super) fn new(engine: &Engine, options: &SessionOptions) -> Self {
-        let period = match options.anchoring {
+        let period = match options.diagnostics.anchoring {
             _ if engine.encoder.is_none() => 0,
             Anchoring::Bundle => engine.config.session.anchor_period,
             Anchoring::Never => 0,
@@ -97,8 +88,8 @@ impl Anchor {
             anchored_at: 0,
             requested: false,
             anchor: options.start,
-            encoder: engine.encoder.as_ref().map(|encoder| encoder.state(options.cache)),
-            next: engine.decoder.state(options.cache),
+            encoder: engine.encoder.as_ref().map(|encoder| encoder.state(options.diagnostics.cache)),
+            next: engine.decoder.state(options.diagnostics.cache),
             capacity,
             features: vec![0.0; capacity as usize * width],
             latents: vec![0.0; capacity as usize * latent],

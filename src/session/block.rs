@@ -51,7 +51,7 @@ impl BlockState {
     pub(super) fn new(exec: &mut Exec, engine: &Engine, options: &SessionOptions) -> Result<Self> {
         let generator_options = GeneratorOptions {
             sampler: options.sampler,
-            dtype: options.cache,
+            dtype: options.diagnostics.cache,
             clean_history: options.clean_history(engine),
         };
         let condition = Condition::absent(engine.layout());
@@ -59,12 +59,12 @@ impl BlockState {
         let generator = Generator::new(exec, engine.nets(), &condition, generator_options);
         exec.end();
         let mut generator = generator?;
-        if options.gaze_control.guides(options.gaze) {
+        if options.diagnostics.gaze_control.guides(options.gaze) {
             generator.open_gaze();
         }
         let rig = &engine.config.rig;
         let mut motion = pose::Decoder::new(engine.kernels, rig, engine.config.pose.radius);
-        if options.bridge && engine.config.session.bridge > 0.0 {
+        if options.diagnostics.bridge && engine.config.session.bridge > 0.0 {
             motion = motion.with_bridge(rig, engine.config.session.bridge);
         }
         if options.guard {
@@ -76,7 +76,7 @@ impl BlockState {
         let mut state = Self {
             inputs: Inputs::new(engine, options)?,
             generator,
-            decoder: engine.decoder.state(options.cache),
+            decoder: engine.decoder.state(options.diagnostics.cache),
             anchor: Anchor::new(engine, options),
             motion,
             work: Work::new(&engine.config),
@@ -94,7 +94,7 @@ impl BlockState {
 
     /// Back to the start: the idle clip as history, the agent where the options put it.
     pub(super) fn reset(&mut self, exec: &mut Exec, engine: &Engine, options: &SessionOptions) -> Result<()> {
-        self.block = options.first_block;
+        self.block = options.diagnostics.first_block;
         self.inputs.reset(self.block);
         self.generator.reset(self.block);
         self.decoder.reset(self.block);
@@ -205,7 +205,7 @@ impl BlockState {
         probe: &mut Option<&mut dyn Probe>,
     ) -> Result<()> {
         let config = engine.config.gaze.as_ref();
-        let gaze = options.gaze_control.cue(config, options.gaze, plan.sampler, options.seed, self.block);
+        let gaze = options.diagnostics.gaze_control.cue(config, options.gaze, plan.sampler, options.seed, self.block);
         self.inputs.prepare(self.block, &self.motion.root(), gaze, probe)
     }
 
@@ -341,7 +341,7 @@ impl Noise {
     /// Seeded noise is scaled by `temperature`; given noise enters as it is.
     fn fill(&self, options: &SessionOptions, temperature: f32, token: u64, eps: &mut [f32]) {
         if let Noise::Given(values) = self
-            && let Some(given) = values.chunks_exact(eps.len()).nth((token - options.first_block) as usize)
+            && let Some(given) = values.chunks_exact(eps.len()).nth((token - options.diagnostics.first_block) as usize)
         {
             return eps.copy_from_slice(given);
         }

@@ -80,7 +80,7 @@ impl Ear {
     fn new(engine: &Engine, options: &SessionOptions, delay: u32) -> Result<Self> {
         Ok(Self {
             voice: Voice::new(),
-            encoder: Hearing::new(engine, options.audio)?,
+            encoder: Hearing::new(engine, options.diagnostics.audio)?,
             samples: Box::new([0.0; BLOCK_SAMPLES]),
             features: vec![0.0; BLOCK_FRAMES * engine.config.audio.features],
             heard: Ok(false),

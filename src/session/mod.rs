@@ -7,6 +7,7 @@
 //! | file | what |
 //! |---|---|
 //! | `options` | what a session is made with |
+//! | `diagnostics` | what measurements and tests change about it |
 //! | `inputs` | voices and head positions to the conditioning of a block |
 //! | `gaze` | the wanted gaze to the gaze channel, free gaze included |
 //! | `block` | the computation of a block |
@@ -21,6 +22,7 @@
 
 mod anchor;
 mod block;
+mod diagnostics;
 mod gaze;
 mod governor;
 mod inputs;
@@ -29,9 +31,10 @@ mod probe;
 mod stats;
 mod team;
 
+pub use diagnostics::{Anchoring, Diagnostics, HistoryTime};
 pub use gaze::GazeControl;
 pub use governor::{Budget, Decision, Governor, GovernorStats, Hold, Plan};
-pub use options::{Anchoring, HistoryTime, SessionOptions};
+pub use options::SessionOptions;
 pub use probe::Probe;
 pub use stats::{Delays, InputStats, SessionStats};
 pub use team::Team;
@@ -147,14 +150,14 @@ impl Session {
     }
 
     /// Sets the gaze target, 0 (averted) to 1 (sustained eye contact), or `None` for free gaze: levels of recorded conversations,
-    /// another one every now and then, where the bundle was calibrated ([`GazeControl`]), else what the model finds natural.
+    /// another one every now and then, where the bundle was calibrated, else what the model finds natural.
     /// Takes effect with the next block. The first target takes the memory of its guidance branch, a copy of some megabytes.
     ///
     /// # Errors
     /// [`ErrorKind::Argument`] outside -1 to 1.
     pub fn set_gaze(&mut self, target: Option<f32>) -> Result<()> {
         options::check_gaze(target)?;
-        if self.options.gaze_control.guides(target) {
+        if self.options.diagnostics.gaze_control.guides(target) {
             self.state.generator.open_gaze();
         }
         self.options.gaze = target;
@@ -243,7 +246,7 @@ impl Session {
         if let Some((plan, work, milliseconds)) = self.last.take() {
             policy.observe(&plan, milliseconds, work);
         }
-        let branches = if self.options.gaze_control.guides(self.options.gaze) { 3 } else { 2 };
+        let branches = if self.options.diagnostics.gaze_control.guides(self.options.gaze) { 3 } else { 2 };
         let outlook = self.state.outlook(policy.ladder(), branches);
         let plan = policy.decide(&outlook);
         let rung = policy.ladder().iter().position(|s| *s == plan.sampler).unwrap_or(0);
@@ -275,6 +278,7 @@ impl Session {
     ///
     /// # Errors
     /// As [`Session::poll`].
+    #[doc(hidden)]
     pub fn poll_with(&mut self, now: f64, probe: Option<&mut dyn Probe>) -> Result<Option<&[Frame]>> {
         if !self.is_due(now)? {
             return Ok(None);
@@ -322,7 +326,7 @@ impl Session {
 
     /// The frames of the last block, or `None` before the first.
     pub fn frames(&self) -> Option<&[Frame]> {
-        (self.state.block > self.options.first_block).then_some(&self.state.frames)
+        (self.state.block > self.options.diagnostics.first_block).then_some(&self.state.frames)
     }
 
     /// Session time at which the next block is due, seconds.
@@ -330,8 +334,7 @@ impl Session {
         (self.state.block * BLOCK_FRAMES as u64) as f64 / f64::from(FPS)
     }
 
-    /// Starts anew, as if just made with the current options: same seed, same bits. Time starts at 0 again (or at that of
-    /// [`SessionOptions::first_block`]).
+    /// Starts anew, as if just made with the current options: same seed, same bits. Time starts at 0 again.
     ///
     /// # Errors
     /// None that the session's creation would not have met.
@@ -358,7 +361,7 @@ impl Session {
     }
 
     /// The kernel's ids of the threads that this session owns and computes on, for performance hints: the second
-    /// thread's where there is one. The thread that calls [`Session::poll`] computes too ([`crate::par::current_thread_id`]).
+    /// thread's where there is one. The thread that calls [`Session::poll`] computes too ([`crate::threads::current_thread_id`]).
     pub fn worker_thread_ids(&self) -> impl Iterator<Item = u32> {
         self.exec.pool().helper_id().into_iter()
     }
@@ -368,6 +371,7 @@ impl Session {
     ///
     /// # Errors
     /// [`ErrorKind::Argument`] when there are fewer tokens than the idle clip has.
+    #[doc(hidden)]
     pub fn reset_with_noise(&mut self, noise: Vec<f32>) -> Result<()> {
         let latent = self.engine.config.vae.latent;
         if noise.len() < self.engine.idle.len() || !noise.len().is_multiple_of(latent) {
@@ -381,7 +385,7 @@ impl Session {
     /// Block times, delays and counters so far.
     pub fn stats(&self) -> SessionStats {
         SessionStats {
-            blocks: self.state.block - self.options.first_block,
+            blocks: self.state.block - self.options.diagnostics.first_block,
             block_ms: self.times.percentiles(),
             delays: self.state.inputs.delays(&self.engine.config),
             inputs: self.state.inputs.stats(),
@@ -417,4 +421,8 @@ impl std::fmt::Debug for Session {
         let name = &self.engine.config.name;
         f.debug_struct("Session").field("model", name).field("blocks", &self.state.block).finish_non_exhaustive()
     }
+}
+
+fn argument(message: impl Into<String>) -> Error {
+    Error::new(ErrorKind::Argument, message)
 }

@@ -1,42 +1,15 @@
 //! What a session is made with.
 
-use super::{GazeControl, Governor};
-use crate::audio::AudioBackend;
+use super::diagnostics::{Diagnostics, HistoryTime};
+use super::{Governor, argument};
 use crate::config::CleanHistory;
 use crate::engine::Engine;
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::{Error, Result};
 use crate::flow::Guidance;
 use crate::frame::{Root, Sampler};
-use crate::kernels::KvDtype;
 
-/// Largest [`SessionOptions::first_block`].
-const MAX_FIRST_BLOCK: u64 = 70_000_000;
-
-/// When recent motion is encoded anew.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Anchoring {
-    /// As the bundle says.
-    #[default]
-    Bundle,
-    /// Never.
-    Never,
-    /// Every this many blocks (at least 1).
-    Every(u32),
-}
-
-/// Flow time at which finished blocks enter the reference network (the single-step student brings its own).
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum HistoryTime {
-    /// As the bundle says.
-    #[default]
-    Bundle,
-    /// At each evaluation's own flow time.
-    Imputed,
-    /// Nearly clean in late evaluations.
-    Clean(CleanHistory),
-}
-
-/// Options of a session. Start from `SessionOptions::default()` and change what is needed.
+/// Options of a session. Start from `SessionOptions::default()` and change what is needed:
+/// `SessionOptions { gaze: Some(0.8), ..Default::default() }`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionOptions {
     /// Seed of the noise: same seed and same inputs, same bits.
@@ -44,7 +17,7 @@ pub struct SessionOptions {
     /// Threads that compute a block, 1 or 2. The result is the same.
     pub threads: usize,
     /// Cores that the second thread may run on (bit i: core i); `None` for any. The first thread is the caller's own:
-    /// [`crate::par::pin_current_thread`].
+    /// [`crate::threads::pin_current_thread`].
     pub core_mask: Option<u64>,
     /// Sampler at the start; with a governor, the best one that it uses.
     pub sampler: Sampler,
@@ -52,34 +25,22 @@ pub struct SessionOptions {
     pub governor: Governor,
     /// Gaze target, -1 to 1, or `None` for free gaze.
     pub gaze: Option<f32>,
-    /// What the target, or its absence, means to the network.
-    pub gaze_control: GazeControl,
     /// Guidance weight, 0 to 20; `None` for the bundle's.
     pub guidance: Option<f32>,
     /// Gaze guidance weight, 0 to 20; `None` for the bundle's.
     pub gaze_guidance: Option<f32>,
     /// Scale of the noise that blocks start from, 0 to 2; `None` for the bundle's. Less gives calmer motion.
     pub temperature: Option<f32>,
-    /// Flow time at which history enters the reference network.
-    pub history: HistoryTime,
     /// Where the agent stands at the start, in the caller's world.
     pub start: Root,
-    /// Storage of the key-value caches; f16 but for checks of the maths.
-    pub cache: KvDtype,
-    /// When recent motion is encoded anew.
-    pub anchoring: Anchoring,
-    /// Whether borders between blocks are bridged, so that motion goes on as it was going; off for checks of the maths.
-    pub bridge: bool,
-    /// Whether the root's steps are corrected so that planted feet stay where they are; off for checks of the maths.
+    /// Whether the root's steps are corrected so that planted feet stay where they are.
     pub stance: bool,
-    /// Whether frames that no body could show are replaced by a held pose ([`crate::pose::GuardStats`]); without it a pose
-    /// that is not finite is an error. Off for checks of the maths.
+    /// Whether frames that no body could show are replaced by a held pose ([`crate::stats::GuardStats`]); without it a pose
+    /// that is not finite is an error.
     pub guard: bool,
-    /// Number of the first block, at most 70 million (108 days): the session's time starts at `4 first_block / 30` s, and
-    /// everything that counts goes on from there. For checks of what long sessions do.
-    pub first_block: u64,
-    /// What runs the audio encoder.
-    pub audio: AudioBackend,
+    /// For measurements and tests.
+    #[doc(hidden)]
+    pub diagnostics: Diagnostics,
 }
 
 impl Default for SessionOptions {
@@ -91,19 +52,13 @@ impl Default for SessionOptions {
             sampler: Sampler::Midpoint(4),
             governor: Governor::Off,
             gaze: None,
-            gaze_control: GazeControl::Calibrated,
             guidance: None,
             gaze_guidance: None,
             temperature: None,
-            history: HistoryTime::Bundle,
             start: Root::default(),
-            cache: KvDtype::F16,
-            anchoring: Anchoring::Bundle,
-            bridge: true,
             stance: true,
             guard: true,
-            first_block: 0,
-            audio: AudioBackend::default(),
+            diagnostics: Diagnostics::default(),
         }
     }
 }
@@ -115,23 +70,13 @@ impl SessionOptions {
         if let Some(t) = self.temperature.filter(|t| !(0.0..=2.0).contains(t)) {
             return Err(argument(format!("temperature {t}: 0 to 2")));
         }
-        if let HistoryTime::Clean(c) = self.history
-            && ![c.tau, c.from].iter().all(|t| (0.0..=1.0).contains(t))
-        {
-            return Err(argument(format!("clean history at {} from {}: both are flow times, 0 to 1", c.tau, c.from)));
-        }
         if !matches!(self.threads, 1 | 2) {
             return Err(argument(format!("threads is {}: 1 or 2", self.threads)));
         }
         if [self.start.x, self.start.z, self.start.yaw].iter().any(|v| !v.is_finite() || v.abs() > 1e6) {
             return Err(argument("start: x, z and yaw must be finite and within a million metres"));
         }
-        if self.anchoring == Anchoring::Every(0) {
-            return Err(argument("anchoring every 0 blocks: use Anchoring::Never"));
-        }
-        if self.first_block > MAX_FIRST_BLOCK {
-            return Err(argument(format!("first block {}: at most {MAX_FIRST_BLOCK}", self.first_block)));
-        }
+        self.diagnostics.check()?;
         self.governor.check()?;
         match self.sampler {
             Sampler::Midpoint(1 | 2 | 4) | Sampler::Euler(1..=64) if engine.flow.is_some() => Ok(()),
@@ -145,7 +90,7 @@ impl SessionOptions {
     }
 
     pub(super) fn clean_history(&self, engine: &Engine) -> Option<CleanHistory> {
-        match self.history {
+        match self.diagnostics.history {
             HistoryTime::Bundle => engine.config.session.clean_history,
             HistoryTime::Imputed => None,
             HistoryTime::Clean(c) => Some(c),
@@ -193,8 +138,4 @@ pub(super) fn unsupported(sampler: Sampler, engine: &Engine) -> Error {
         }
         Sampler::Euler(_) => format!("{sampler}: Euler takes 1 to 64 steps"),
     })
-}
-
-fn argument(message: impl Into<String>) -> Error {
-    Error::new(ErrorKind::Argument, message)
 }

@@ -220,7 +220,8 @@ fn gather<'a, 's>(sessions: &'a mut [(&'s mut Session, f64)]) -> Option<[Option<
 impl Session {
     /// Rows of a shared pass that the block of `plan` takes; `None` where it cannot share one.
     fn shared_rows(&self, plan: &Plan) -> Option<usize> {
-        let rows = self.state.generator.rows(plan.sampler, self.options.gaze_control.guides(self.options.gaze))?;
+        let rows =
+            self.state.generator.rows(plan.sampler, self.options.diagnostics.gaze_control.guides(self.options.gaze))?;
         (plan.hold == Hold::No).then_some(rows)
     }
 }

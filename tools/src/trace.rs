@@ -36,8 +36,8 @@ use safetensors::tensor::TensorView;
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use std::sync::Arc;
-use visavis::internals::session::Probe;
-use visavis::{BLOCK_FRAMES, Engine, Error, ErrorKind, FPS, GazeControl, Result, SAMPLE_RATE, SessionOptions};
+use visavis::internals::session::{Diagnostics, GazeControl, Probe};
+use visavis::{BLOCK_FRAMES, Engine, Error, ErrorKind, FPS, Result, SAMPLE_RATE, SessionOptions};
 
 /// A dense array, row-major.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,13 +58,13 @@ pub struct Trace {
 /// Runs `input` through a session made with `options`, whose gaze is replaced by the input's, and returns every stage.
 ///
 /// For comparisons with an implementation of the networks alone, ask for [`visavis::internals::kernels::KvDtype::F32`] and
-/// [`visavis::internals::session::Anchoring::Never`], and turn [`SessionOptions::bridge`] and [`SessionOptions::stance`] off.
+/// [`visavis::internals::session::Anchoring::Never`], and turn [`Diagnostics::bridge`] and [`SessionOptions::stance`] off.
 ///
 /// # Errors
 /// [`ErrorKind::Argument`] for options that the bundle cannot do, [`ErrorKind::Audio`] for voices that are not finite.
 pub fn trace(engine: &Arc<Engine>, input: &TraceInput, options: SessionOptions) -> Result<Trace> {
-    let mut session =
-        engine.session(SessionOptions { gaze: input.gaze, gaze_control: GazeControl::Channel, ..options })?;
+    let diagnostics = Diagnostics { gaze_control: GazeControl::Channel, ..options.diagnostics };
+    let mut session = engine.session(SessionOptions { gaze: input.gaze, diagnostics, ..options })?;
     if let Some(noise) = &input.noise {
         session.reset_with_noise(noise.clone())?;
     }

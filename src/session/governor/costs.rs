@@ -4,13 +4,23 @@
 //! times of the shipped model: midpoint4, midpoint2 and the single step stand as 4.4 to 2.6 to 1, measured 3.3 to 2.2 to 1. The
 //! governor's headroom covers the difference.
 
-use super::super::anchor::Share;
 use crate::config::Config;
 use crate::flow::Generator;
 use crate::frame::{BLOCK_SAMPLES, Sampler};
 
 /// Tokens that a pass over a slot commits at most.
 const CHUNK: u64 = 8;
+
+/// What a block does for re-anchoring.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(in crate::session) struct Share {
+    /// Blocks that are encoded.
+    pub(in crate::session) encoded: u64,
+    /// Passes of eight tokens over a slot.
+    pub(in crate::session) passes: u64,
+    /// Blocks that are decoded.
+    pub(in crate::session) decoded: u64,
+}
 
 /// Prices of the parts of a block.
 #[derive(Debug, Clone, Copy)]

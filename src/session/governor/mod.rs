@@ -29,7 +29,7 @@ mod costs;
 mod log;
 mod policy;
 
-pub(super) use costs::Work;
+pub(super) use costs::{Share, Work};
 pub(super) use log::Log;
 pub(super) use policy::{Outlook, Policy};
 

@@ -4,7 +4,7 @@ use super::args::TraceArgs;
 use super::print;
 use std::fmt::Write;
 use visavis::internals::kernels::KvDtype;
-use visavis::internals::session::Anchoring;
+use visavis::internals::session::{Anchoring, Diagnostics};
 use visavis::{Engine, Result, SessionOptions};
 use visavis_tools::trace::{TraceInput, trace};
 
@@ -16,11 +16,14 @@ pub fn run(args: &TraceArgs) -> Result<()> {
         sampler: args.sampler,
         guidance: args.guidance,
         gaze_guidance: args.gaze_guidance,
-        cache: KvDtype::F32,
-        anchoring: Anchoring::Never,
-        bridge: false,
         stance: false,
         guard: false,
+        diagnostics: Diagnostics {
+            cache: KvDtype::F32,
+            anchoring: Anchoring::Never,
+            bridge: false,
+            ..Diagnostics::default()
+        },
         ..SessionOptions::default()
     };
     let trace = trace(&engine, &input, options)?;

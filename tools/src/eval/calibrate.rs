@@ -8,7 +8,8 @@ use super::window::{WINDOW, Window};
 use crate::metrics::head_angle;
 use std::sync::Arc;
 use visavis::internals::config::{GazeConfig, GazeCurve};
-use visavis::{Engine, Error, ErrorKind, FPS, GazeControl, Result, Sampler, SessionOptions};
+use visavis::internals::session::{Diagnostics, GazeControl};
+use visavis::{Engine, Error, ErrorKind, FPS, Result, Sampler, SessionOptions};
 
 /// Values of the channel at which the model's gaze is measured.
 const CHANNEL: [f32; 7] = [-0.6, -0.3, 0.0, 0.25, 0.5, 0.75, 1.0];
@@ -19,7 +20,7 @@ const LEVELS: usize = 17;
 /// of the clips' own agents on all their windows (of conversations it takes a hundred to tell their mean within 0.03). Best on clips that were not trained on; the figures of `visavis eval` are then taken on others again.
 ///
 /// The result is for the bundle's default guidance; it goes into the bundle's config ([`visavis::internals::config::Config::gaze`]), and
-/// sessions follow it unless told otherwise ([`SessionOptions::gaze_control`]). What the config holds so far makes no difference.
+/// sessions follow it unless told otherwise ([`GazeControl`]). What the config holds so far makes no difference.
 ///
 /// # Errors
 /// Those of [`Clip::read`], [`Window::choose`] and of sessions; [`ErrorKind::Argument`] for clips without users, and for a model
@@ -50,7 +51,8 @@ pub fn calibrate(
             let done = |done| progress(EvalProgress { stage: &stage, done, total: windows.len() });
             let scores = each(threads, windows.len(), &done, &|i| {
                 let seed = i as u64;
-                let options = SessionOptions { sampler, gaze: Some(value), gaze_control, seed, ..Default::default() };
+                let diagnostics = Diagnostics { gaze_control, ..Default::default() };
+                let options = SessionOptions { sampler, gaze: Some(value), diagnostics, seed, ..Default::default() };
                 let frames = motion::in_window(engine, &options, &windows[i])?;
                 Ok(head_angle(&windows[i].truth.recording(rig, frames)))
             })?;

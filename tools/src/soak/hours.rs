@@ -19,7 +19,7 @@ use serde::Serialize;
 use std::sync::Arc;
 use visavis::internals::frame::BLOCK_SAMPLES;
 use visavis::internals::nn::PERIOD;
-use visavis::internals::session::Anchoring;
+use visavis::internals::session::{Anchoring, Diagnostics};
 use visavis::{BLOCK_FRAMES, Engine, FPS, Frame, Result, Sampler, Session, SessionOptions};
 
 /// Blocks of 24 hours.
@@ -97,8 +97,8 @@ fn beginning(voice: &[f32], samples: usize) -> &[f32] {
 
 /// Motion from `first_block` on, of a conversation with a user who walks.
 fn talk(engine: &Arc<Engine>, voices: &Voices, sampler: Sampler, first_block: u64) -> Result<Vec<Frame>> {
-    let options =
-        SessionOptions { first_block, sampler, gaze: Some(0.8), anchoring: Anchoring::Every(8), ..Default::default() };
+    let diagnostics = Diagnostics { first_block, anchoring: Anchoring::Every(8), ..Default::default() };
+    let options = SessionOptions { sampler, gaze: Some(0.8), diagnostics, ..Default::default() };
     let mut session = engine.session(options)?;
     quieten(&mut session, BLOCKS, 7)?;
     session.push_agent_audio(beginning(voices.agent(), BLOCKS * BLOCK_SAMPLES), 24_000)?;
@@ -119,7 +119,8 @@ fn talk(engine: &Arc<Engine>, voices: &Voices, sampler: Sampler, first_block: u6
 
 /// The first block at `first_block` under several noises: its history is the bundle's idle clip, whenever it is.
 fn single_blocks(engine: &Arc<Engine>, voices: &Voices, sampler: Sampler, first_block: u64) -> Result<Vec<Frame>> {
-    let mut session = engine.session(SessionOptions { first_block, sampler, ..Default::default() })?;
+    let diagnostics = Diagnostics { first_block, ..Default::default() };
+    let mut session = engine.session(SessionOptions { sampler, diagnostics, ..Default::default() })?;
     let mut frames = Vec::new();
     for seed in 0..NOISES {
         quieten(&mut session, 1, seed)?;

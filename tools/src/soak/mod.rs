@@ -38,6 +38,7 @@ pub use window::Figures;
 use script::Script;
 use std::sync::Arc;
 use std::time::Instant;
+use visavis::internals::session::Diagnostics;
 use visavis::{BLOCK_FRAMES, Engine, Error, ErrorKind, FPS, Result, Sampler, Session, SessionOptions};
 use window::Window;
 
@@ -83,11 +84,12 @@ impl Soak {
         let options = SessionOptions {
             seed: self.seed,
             sampler: self.sampler,
-            first_block: (self.from_hour * HOUR) as u64,
+            diagnostics: Diagnostics { first_block: (self.from_hour * HOUR) as u64, ..Default::default() },
             ..SessionOptions::default()
         };
         let mut session = engine.session(options.clone())?;
-        let mut second = engine.session(SessionOptions { seed: self.seed + 1, first_block: 0, ..options })?;
+        let mut second =
+            engine.session(SessionOptions { seed: self.seed + 1, diagnostics: Diagnostics::default(), ..options })?;
         let mut script = Script::new(voices, engine, self.sampler, cycle);
         let (mut window, mut cycles) = (Window::new(&engine.config().rig), Vec::new());
         let warm = (cycle / 10).max(10);

@@ -12,14 +12,14 @@
 use glam::Vec3;
 use std::sync::Arc;
 use std::time::Instant;
-use visavis_tools::bench::Size;
-use visavis::{BundleFile, Engine, Sampler, Session, SessionOptions};
 use visavis::internals::kernels::{Kernels, KvDtype, Scheme};
 use visavis::internals::quant::{Options, SMALL, quantise};
-use visavis::internals::session::{Anchoring, Probe};
-use visavis_tools::trace::{TraceInput, trace};
+use visavis::internals::session::{Anchoring, Diagnostics, Probe};
+use visavis::{BundleFile, Engine, Sampler, Session, SessionOptions};
 use visavis_peers::Result;
 use visavis_peers::worker::{Blocks, serve};
+use visavis_tools::bench::Size;
+use visavis_tools::trace::{TraceInput, trace};
 
 fn main() -> Result<()> {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -64,7 +64,7 @@ fn main() -> Result<()> {
 /// Runs whole blocks, two voices and pose included, each between two markers.
 fn count(bundle: &str, sampler: Sampler, blocks: usize) -> Result<()> {
     let engine = Engine::load(bundle)?;
-    let options = SessionOptions { sampler, anchoring: Anchoring::Never, ..SessionOptions::default() };
+    let options = SessionOptions { sampler, diagnostics: Anchoring::Never.into(), ..SessionOptions::default() };
     let mut session = engine.session(options)?;
     let tone: Vec<f32> = (0..3200).map(|i| 0.2 * (0.04 * i as f32).sin()).collect();
     for _ in 0..blocks {
@@ -94,7 +94,7 @@ fn grow(bundle: &str, numbers: &[usize]) -> Result<()> {
     let options = |seed| SessionOptions {
         seed,
         gaze: (*gaze > 0).then_some(0.5),
-        anchoring: Anchoring::Never,
+        diagnostics: Anchoring::Never.into(),
         ..SessionOptions::default()
     };
     let mut sessions = (0..*sessions as u64).map(|i| Ok(engine.session(options(i))?)).collect::<Result<Vec<_>>>()?;
@@ -131,11 +131,9 @@ fn marker() {
 /// The networks alone: nothing after the decoder that peers do not have.
 fn plain(cache: KvDtype) -> SessionOptions {
     SessionOptions {
-        cache,
-        anchoring: Anchoring::Never,
-        bridge: false,
         stance: false,
         guard: false,
+        diagnostics: Diagnostics { cache, anchoring: Anchoring::Never, bridge: false, ..Diagnostics::default() },
         ..SessionOptions::default()
     }
 }

@@ -1,5 +1,7 @@
 //! The skeleton of a bundle.
 
+mod humanoid;
+
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::Transform;
 use glam::{Quat, Vec3};
