@@ -38,7 +38,7 @@ def truncated(path):
         arrays = {k: f[k] for k in f}
     for k, v in arrays.items():
         if v.dtype == np.float32:
-            arrays[k] = (np.ascontiguousarray(v).view(np.int32) & ~np.int32(0x7F)).view(np.float32)
+            arrays[k] = (np.ascontiguousarray(v).view(np.int32) & ~np.int32(0x7F)).view(np.float32).reshape(v.shape)
     out = io.BytesIO()
     np.savez(out, **arrays)
     return out.getvalue()

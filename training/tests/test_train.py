@@ -45,7 +45,7 @@ def made_windows(tmp_path, blocks=16, clips=2, frames=160, latent=8, **kw):
     path = str(tmp_path / "train.pt")
     torch.save({"names": ["a"] * clips, "starts": torch.arange(clips + 1) * frames, "has": torch.tensor([[True, False]] * clips),
                 "roots": roots.repeat(clips, 1), "user": torch.randn(total, 3) + 2, "gaze": torch.rand(total), "agent": torch.randn(total, 6).half(),
-                "voice": torch.randn(total, 6).half(), "z": torch.cat(rows), "segments": torch.tensor(segments), "latent_mean": torch.zeros(latent),
+                "voice": torch.randn(total, 6).half(), "still": torch.arange(total) % 8 < 4, "z": torch.cat(rows), "segments": torch.tensor(segments), "latent_mean": torch.zeros(latent),
                 "latent_std": torch.ones(latent)}, path)
     return windows.Windows(path, blocks, **kw)
 
@@ -192,12 +192,38 @@ def test_flow_losses_fall_when_trained(tmp_path):
     optim, metric, seen = common.optimiser(net, 3e-3), torch.eye(8), []
     for step in range(60):
         z, cond = w.batch(8)
-        loss = (flow.shared_loss if step % 2 else flow.apart_loss)(net, z, cond, metric, 0.1)
+        loss = (flow.shared_loss if step % 2 else flow.apart_loss)(net, z, cond, metric, 0.1, 1.0, 0)
         optim.zero_grad()
         loss.backward()
         optim.step()
         seen.append(loss.item())
     assert sum(seen[-10:]) < 0.9 * sum(seen[:10])
+
+
+def test_late_weights_are_one_on_average_and_weigh_velocities_alike():
+    tau = (torch.arange(100000) + 0.5) / 100000
+    for late in (0, 0.5, 1, 2):
+        assert flow.late_weight(tau, late).mean().item() == pytest.approx(1, abs=1e-3)
+    w = flow.late_weight(torch.tensor([0.0, 0.5, 0.9, 0.99]), 2)
+    assert (w[1] / w[0]).item() == pytest.approx(4, rel=1e-4) and w[2].item() == pytest.approx(w[3].item(), rel=1e-4)
+
+
+def test_still_blocks_are_found(tmp_path):
+    w = made_windows(tmp_path)
+    segment, at = w.draw(3)
+    first = segment[:, 1] + 4 * at
+    want = torch.tensor([[(torch.arange(f + 4 * k, f + 4 * k + 4) % 8 < 4).float().mean() for k in range(16)] for f in first.tolist()])
+    assert torch.equal(w.stillness(segment, at), want)
+
+
+def test_a_rough_latent_space_costs_nothing_unless_asked_for():
+    net, x = make_tiny.lively(vae.Vae(75, 8, 1, 16, 2, 2, 3)), torch.randn(2, 16, 75)
+    torch.manual_seed(1)
+    plain = net(x)[0]
+    torch.manual_seed(1)
+    assert torch.equal(net(x, rough=0.0)[0], plain)
+    apart = [(net(x, noise=False, rough=r)[0] - net(x, noise=False)[0]).square().mean().item() for r in (0.1, 1.0)]
+    assert 0 < apart[0] < apart[1]
 
 
 def test_audio_targets_hear_pitch_and_loudness():

@@ -76,8 +76,12 @@ class Vae(nn.Module):
         self.encoder = Encoder(features, latent, layers, width, heads, mlp, window_blocks)
         self.decoder = Decoder(features, latent, layers, width, heads, mlp, window_blocks)
 
-    def forward(self, x, noise=True):
+    def forward(self, x, noise=True, rough=0.0):
+        """Reconstruction, mu and logvar. `rough`: latents get white noise too, of up to so many of their deviations, another amount each window."""
         mu, logvar = self.encoder(x)
         mu, logvar = mu.float(), logvar.float().clamp(-12, 6)
         z = mu + torch.randn_like(mu) * (0.5 * logvar).exp() if noise else mu
+        if rough:
+            amount = rough * torch.rand(len(mu), 1, 1, device=mu.device)
+            z = z + amount * mu.detach().flatten(0, 1).std(0) * torch.randn_like(mu)
         return self.decoder(z).float(), mu, logvar

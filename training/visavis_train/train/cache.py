@@ -9,12 +9,14 @@ import os
 
 import torch
 
-from ..corpus import store
+from ..corpus import measures, store
+from ..motion import rig
 from ..nets.audio import AudioEncoder
 from ..nets.vae import Vae
 from . import common
 from .common import mixed
 from .data import Split, expand
+from .geometry import to_world
 from .team import Team
 
 PHASES = (4, 6)
@@ -92,6 +94,17 @@ def heard(clips, audio, which):
     return out
 
 
+def still(clips):
+    """Frames [N] bool in which both hands are still."""
+    out = []
+    for a, b in zip(clips.starts[:-1].tolist(), clips.starts[1:].tolist()):
+        frames, roots = clips.frames[a:b], clips.roots[a:b]
+        p = to_world(roots, frames[:, 3:3 + 3 * rig.J].unflatten(1, (-1, 3)).double()).numpy()
+        t = measures.tracks(p, rig.axis_mat("y", roots[:, 2].numpy())[:, None])
+        out.append(torch.from_numpy((t["hand_v"] < measures.STILL).all(1)))
+    return torch.cat(out)
+
+
 def joined(clips, made, stats):
     """The file's tensors of all clips' latents; `stats` None: theirs become the standard."""
     rows, segments, at = [], [], 0
@@ -143,7 +156,7 @@ def main():
                 state |= {name: torch.cat([parts[i][who] for i in range(len(clips))]) for who, name in enumerate(("agent", "voice"))}
         if team.leads:
             shared = {name: getattr(clips, name).clone() for name in ("roots", "user", "gaze")}
-            common.save(os.path.join(args.out, split + ".pt"), names=clips.names, starts=clips.starts, has=clips.has, **shared, **state)
+            common.save(os.path.join(args.out, split + ".pt"), names=clips.names, starts=clips.starts, has=clips.has, still=still(clips), **shared, **state)
             print(f"{split}: {len(clips)} clips, {int(clips.starts[-1]) / 108000:.2f} hours", flush=True)
     team.close()
 

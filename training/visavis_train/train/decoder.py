@@ -76,6 +76,7 @@ def main():
     parser.add_argument("--free", type=float, default=1.0, help="factor on the losses of roll-outs")
     parser.add_argument("--smooth", type=float, default=3.0, help="factor on the corpus half's losses of velocities and accelerations")
     parser.add_argument("--noise", type=float, default=1.2, help="greatest noise, in deviations of the flow's errors")
+    parser.add_argument("--white", type=float, default=0.0, help="greatest white noise besides, in deviations of the latents [0]")
     parser.add_argument("--temperature", type=float, default=0.75, help="scale of the roll-outs' noise, as sessions use it")
     common.arguments(parser, steps=500, lr=4e-4, batch=8)
     args = parser.parse_args()
@@ -88,7 +89,7 @@ def main():
     jw = jw / jw.mean()
     net.load_state_dict(first["ema"])
     net.encoder.requires_grad_(False)
-    factor = error_factor(args.flow, args.cache, device)
+    factor, deviation = error_factor(args.flow, args.cache, device), common.load(args.flow)["latent_std"].to(device)
     free = None
     if args.student:
         student, state = load_flow(args.student, device)
@@ -105,7 +106,10 @@ def main():
         with mixed(device):
             with torch.no_grad():
                 mu, logvar = (t.float() for t in net.encoder(x))
-            z = mu + (torch.randn_like(mu) @ factor.T) * (args.noise * torch.rand(len(mu), 1, 1, device=device))
+            amount = lambda most: most * torch.rand(len(mu), 1, 1, device=device)
+            z = mu + amount(args.noise) * (torch.randn_like(mu) @ factor.T)
+            if args.white:
+                z = z + amount(args.white) * deviation * torch.randn_like(mu)
             count = len(z)
             if free:
                 z = torch.cat([z, free.sample(args.batch, args.blocks)])

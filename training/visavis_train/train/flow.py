@@ -8,6 +8,7 @@ training an existing flow with the audio encoder unfrozen on raw voices (--corpu
 as long as its step, so that `--live` hears some of each batch.
 """
 import argparse
+import math
 import os
 
 import torch
@@ -53,17 +54,26 @@ def noisy(z, tau, eps):
     return tau[..., None] * z + (1 - tau[..., None]) * eps
 
 
-def shared_loss(net, z, cond, metric, slip):
-    """Regime of the reference sampler: one flow time a window. `slip` is the deviation of what history adds to the truth."""
+def late_weight(tau, late):
+    """Weight of an error at a flow time. x1's error e at tau is an error e / (1 - tau) of the velocity: `late` 2 weighs velocities alike, 0 latents.
+    Held from tau 0.9 on, and 1 on average over 0 .. 1."""
+    held = (1 - tau).clamp(min=0.1) ** -late
+    mean = 0.1 * 0.1 ** -late + (math.log(10) if late == 1 else (0.1 ** (1 - late) - 1) / (late - 1))
+    return held / mean
+
+
+def shared_loss(net, z, cond, metric, slip, weight, late):
+    """Regime of the reference sampler: one flow time a window. `slip` is the deviation of what history adds to the truth; `weight` [B, T] that of
+    each token, `late` as in `late_weight`."""
     b, uniform = len(z), lambda *shape: torch.rand(*shape, device=z.device)
     tau = (torch.arange(b, device=z.device)[:, None] + uniform(b, 1)) / b
     off = torch.randn_like(z) * (slip * uniform(b, 1, 1) * (uniform(b, 1, 1) < 0.5))
     with mixed(z.device):
         x1 = net(noisy(z + off, tau, torch.randn_like(z)), tau, cond)
-    return x1_error(x1, z, metric).mean()
+    return (x1_error(x1, z, metric) * weight * late_weight(tau, late)).mean()
 
 
-def apart_loss(net, z, cond, metric, slip):
+def apart_loss(net, z, cond, metric, slip, weight, late):
     """Regime of the student: history at tau_h in 0.8 .. 1, each current block at a flow time of its own."""
     b, uniform = len(z), lambda *shape: torch.rand(*shape, device=z.device)
     tau_h = 0.8 + 0.2 * uniform(b, 1)
@@ -71,7 +81,7 @@ def apart_loss(net, z, cond, metric, slip):
     off = torch.randn_like(z) * (slip * uniform(b, 1, 1))
     with mixed(z.device):
         x1 = net.forward_pair(noisy(z + off, tau_h, torch.randn_like(z)), tau_h, noisy(z, tau, torch.randn_like(z)), tau, cond)
-    return x1_error(x1, z, metric).mean()
+    return (x1_error(x1, z, metric) * weight * late_weight(tau, late)).mean()
 
 
 def load_flow(path, device="cpu"):
@@ -124,6 +134,8 @@ def main():
     parser.add_argument("--blocks", type=int, default=64)
     parser.add_argument("--apart", type=float, default=0.35, help="share of time on the regime with history and current apart")
     parser.add_argument("--slip", type=float, default=0.15)
+    parser.add_argument("--late", type=float, default=0.0, help="weight on late flow times: errors weigh (1 - tau)^-LATE; 2 weighs velocities alike [0]")
+    parser.add_argument("--still", type=float, default=0.0, help="blocks in which the corpus' hands are still weigh 1 + STILL [0]")
     parser.add_argument("--end-to-end", metavar="AUDIO", help="audio checkpoint to train along; needs --init and --corpus")
     parser.add_argument("--corpus", help="corpus of the cache, for --end-to-end")
     parser.add_argument("--live", type=int, help="windows of a batch whose voices --end-to-end hears, others taking cached features [all]")
@@ -154,12 +166,15 @@ def main():
     measure = lambda net: validate(net, held, metric)
     if args.compile:
         with torch.no_grad():
-            apart_loss(net, *train.batch(2), metric, 0), shared_loss(net, *train.batch(2), metric, 0)  # makes the tables
+            for f in kinds.values():
+                f(net, *train.batch(2), metric, 0, 1.0, 0)  # makes the tables
         kinds = {k: torch.compile(f, dynamic=False) for k, f in kinds.items()}
     for step in loop:
         apart = team.draw(args.seed, step) < share  # the same regime in all processes: none waits for the dearer one
-        z, cond = train.batch(args.batch)
-        loss = kinds[apart](net, z, cond, metric, args.slip)
+        place = train.draw(args.batch)
+        z, cond = train.batch(args.batch, place)
+        weight = 1 + args.still * train.stillness(*place)
+        loss = kinds[apart](net, z, cond, metric, args.slip, weight / weight.mean(), args.late)
         loop.update(loss, **{"apart" if apart else "shared": loss})
         loop.report(100, measure, 500)
     loop.finish(measure)

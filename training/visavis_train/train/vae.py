@@ -109,6 +109,8 @@ def main():
     parser.add_argument("--captured", type=float, default=3.0, help="captured takes are drawn this many times as often as their length says")
     parser.add_argument("--init", help="checkpoint whose weights to start from (schedule starts anew)")
     parser.add_argument("--smooth", type=float, default=1.0, help="factor on the loss of velocities and accelerations")
+    parser.add_argument("--rough", type=float, default=0.0, help="greatest white noise on the latents that are decoded, in deviations of the latents [0]: makes "
+                        "small noise mean little motion")
     parser.add_argument("--evaluate", metavar="SPLIT", help="only print how well --out reconstructs that split")
     common.arguments(parser, steps=4000, lr=1.5e-3, batch=16)
     args = parser.parse_args()
@@ -144,7 +146,7 @@ def main():
 
     def forward(x):
         with mixed(device):
-            y, mu, logvar = net(x)
+            y, mu, logvar = net(x, rough=args.rough)
         parts = losses(x, y, mean, std, mu, logvar, weights, jw)
         return sum(scale.get(k, 1.0) * v for k, v in parts.items()), parts
 

@@ -30,7 +30,7 @@ class Windows:
         self.blocks, self.device = blocks, torch.device(device)
         self.drop, self.drop_all, self.drop_gaze, self.prefix, self.jitter = drop, drop_all, drop_gaze, prefix, jitter
         self.audio, self.live, self.voices = audio, live, voices
-        for name in ("z", "roots", "user", "agent", "voice"):
+        for name in ("z", "roots", "user", "agent", "voice", "still"):
             setattr(self, name, state[name].to(self.device))
         self.mean, self.std, self.starts, self.has = state["latent_mean"], state["latent_std"], state["starts"], state["has"].float()
         self.segments = state["segments"][state["segments"][:, 3] >= blocks]
@@ -67,6 +67,10 @@ class Windows:
         flags[..., 1:3] = self.has[segment[:, 0]].to(self.device)[:, None]
         together = lambda x: x.float().reshape(b, n, -1)
         return z, Condition(user.flatten(2), together(self.agent[now]), together(self.voice[before]), gaze.reshape(b, n, 4), flags)
+
+    def stillness(self, segment, at):
+        """Share of each block's frames [B, K] in which both hands are still."""
+        return self.still[self.frames(segment, at)[:, 4:]].float().unflatten(1, (self.blocks, 4)).mean(-1)
 
     def hear(self, segment, at):
         """Agent's and user's features [B, K, 4 D_a] each, straight from the voices."""
