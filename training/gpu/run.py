@@ -64,6 +64,8 @@ def work(args):
             "--hours", str(args.hours), "--seed", str(args.seed), "--processes", str(os.cpu_count()), "--keep-minutes", "1"]
     env = os.environ | {"PYTHONPATH": os.path.dirname(HERE), "PYTHONUNBUFFERED": "1"}
     subprocess.run([*line, "--until", "arrays"], check=True, env=env)
+    if args.prepare:
+        return
     left = args.minutes - (time.monotonic() - began) / 60
     finished = lambda stage: os.path.exists(os.path.join(args.place, "runs", f"{stage}.done"))
     total = sum(share for stage, share in SHARES.items() if not finished(stage)) + 1 - sum(SHARES.values())
@@ -123,6 +125,7 @@ def main():
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--wait", type=float, default=540, help="seconds after which what there is is brought")
     parser.add_argument("--collect", action="store_true")
+    parser.add_argument("--prepare", action="store_true", help="only build the corpus")
     parser.add_argument("--device", default="cuda", choices=GIVEN)
     parser.add_argument("--place", default="/tmp/visavis")
     parser.add_argument("--carry", default=os.path.join(HERE, "carry"))
@@ -150,7 +153,7 @@ def main():
             break
         time.sleep(1)
     left = collect(args.place, os.environ["OUT"])
-    state = "runs" if alive(args.place) else "finished" if finished() else "FAILED: see the log above"
+    state = "runs" if alive(args.place) else "finished" if finished() else "ended"
     print(f"training {state}; {left} parts are left to bring" + (": call with --collect" if left else ""))
 
 

@@ -92,6 +92,8 @@ TRAINERS = {
                                     r / "corpus", "--live", 1, "--blocks", 24]),
     "student": (student, lambda r: ["--cache", r / "cache", "--vae", r / "vae.pt", "--flow", r / "flow.pt", "--teach", 2, "--reuse", 2, "--own", 100,
                                     "--blocks", 20, "--memory", 3]),
+    "student-matching": (student, lambda r: ["--cache", r / "cache", "--vae", r / "vae.pt", "--flow", r / "flow.pt", "--teach", 2, "--reuse", 2,
+                                             "--blocks", 20, "--memory", 3, "--matching", 0.5, "--adversarial", 0.1]),
     "decoder": (decoder, lambda r: ["--corpus", r / "corpus", "--cache", r / "cache", "--vae", r / "vae.pt", "--flow", r / "flow.pt", "--student",
                                     r / "student.pt", "--blocks", 8]),
 }

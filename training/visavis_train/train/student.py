@@ -20,6 +20,7 @@ from .common import mixed
 from .flow import latent_metric, load_flow, noisy, x1_error
 from .geometry import integrate, to_local
 from .loop import Loop
+from .matching import Adversary, Critic, Judge
 from .team import Team
 from .windows import Windows
 
@@ -87,12 +88,13 @@ class Memory:
         self.count += len(eps)
 
     def pick(self, fresh, batch):
-        """The `fresh` newest sequences, and random ones to make up `batch`: history, eps, wish, condition, own."""
+        """The `fresh` newest sequences, and random ones to make up `batch`: history, eps, wish, condition, own, places."""
         newest = torch.arange(self.count - fresh, self.count) % self.size
         rows = torch.cat([newest, torch.randint(0, min(self.count, self.size), (batch,))])[:batch]
         at = lambda name: self.kept[name][rows.to(self.kept[name].device)]
-        heard = self.windows.read(at("segment"), at("at"))[1]
-        return at("history"), at("eps"), at("wish"), Condition(at("user"), heard.agent, heard.voice, at("gaze"), at("flags")), at("own")
+        where = at("segment"), at("at")
+        heard = self.windows.read(*where)[1]
+        return at("history"), at("eps"), at("wish"), Condition(at("user"), heard.agent, heard.voice, at("gaze"), at("flags")), at("own"), where
 
     def state_dict(self):
         return {"count": self.count, "kept": self.kept}
@@ -155,12 +157,15 @@ def main():
     parser.add_argument("--init", help="student checkpoint to start from; without it the flow")
     parser.add_argument("--init-change", nargs=2, metavar=("FLOW", "STUDENT"),
                         help="start from --flow changed as this earlier flow was on the way to its student: much nearer than the flow itself")
+    parser.add_argument("--matching", type=float, default=0.0, help="weight of distribution matching (train/matching.py) [0]")
+    parser.add_argument("--adversarial", type=float, default=0.0, help="weight of the adversarial loss on decoded motion [0]")
     parser.add_argument("--memory", type=int, default=800, help="sequences that updates draw on")
     common.arguments(parser, steps=3000, lr=4e-4, batch=16)
     args = parser.parse_args()
     device, team = common.start_process(args), Team(args.workers)
     windows = Windows(os.path.join(args.cache, "train.pt"), args.blocks, 0.03, 0.02, 0, 0.05, device=device)
     vae, mean, std, _ = load_vae(args.vae, device)
+    vae.requires_grad_(False)
     (teacher, base), (net, _) = load_flow(args.flow, device), load_flow(args.flow, device)
     teacher.requires_grad_(False)
     net.load_state_dict(beginning(base["ema"], args.init, args.init_change))
@@ -170,7 +175,11 @@ def main():
         base["metric"] = latent_metric(vae, mean, std, windows.batch(24)[0][:, :16], windows.mean.to(device), windows.std.to(device)).cpu()
     metric, kept = base["metric"].to(device), {k: base[k] for k in ("size", "latent", "audio", "latent_mean", "latent_std", "metric")}
     memory = Memory(windows, args.memory)
-    loop = Loop(team, net.train(), args, warmup=50, memory=memory, tau_history=args.tau_history, guidance=args.guidance,
+    decode = lambda z: vae.decoder(z * windows.std.to(device) + windows.mean.to(device)) * std + mean
+    critic = Critic(load_flow(args.flow, device)[0].train(), teacher) if args.matching else None
+    adversary = Adversary(Judge().to(device), decode) if args.adversarial else None
+    beside = ({"critic": critic.net} if critic else {}) | ({"judge": adversary.judge} if adversary else {})
+    loop = Loop(team, net.train(), args, warmup=50, beside=beside, memory=memory, tau_history=args.tau_history, guidance=args.guidance,
                 gaze_guidance=args.gaze_guidance, temperature=args.temperature, **kept)
     rollouts, tau = Rollouts(windows, vae, mean, std), torch.full((1, 1), args.tau_history, device=device)
     for step in loop:
@@ -186,11 +195,18 @@ def main():
             wish = teach(teacher, history, eps, calibrated(cond, args.gaze_map) if gaze else cond, gaze, args.guidance, args.gaze_guidance,
                          tau_history=args.tau_history, clean_from=args.clean_from)
             memory.add(place, history, eps, wish, cond, own)
-        history, eps, wish, cond, own = memory.pick(args.teach, args.batch)
+        history, eps, wish, cond, own, where = memory.pick(args.teach, args.batch)
         with mixed(device):
             x1 = net.forward_pair(noisy(history, tau, eps), tau, eps, torch.zeros(1, 1, device=device), cond)
         error = x1_error(x1, wish, metric)[:, 4:].mean(1)
-        loop.update(error.mean(), loss=error.mean(), **({"own": error[own.to(device)].mean()} if own.any() else {}))
+        loss, parts = error.mean(), {"loss": error.mean()} | ({"own": error[own.to(device)].mean()} if own.any() else {})
+        if critic:
+            move, told = critic.losses(history, tau, eps, x1, cond, metric)
+            loss, parts = loss + args.matching * move + told, parts | {"matching": move, "critic": told}
+        if adversary:
+            move, told = adversary.losses(x1, windows.read(*where)[0])
+            loss, parts = loss + args.adversarial * move + told, parts | {"adversarial": move, "judge": told}
+        loop.update(loss, **parts)
         loop.report(100)
     loop.finish()
 
