@@ -13,7 +13,7 @@ import time
 import torch
 from torch import nn
 
-from . import common
+from . import common, curves
 
 PROBE = (10, 40)  # steps between which `--minutes` measures
 
@@ -123,7 +123,7 @@ class Loop:
         self.sums = {}
         with torch.random.fork_rng():
             measured = measure(self.ema.net) if measure else {}
-        self.log.write(step=self.step, minutes=self.elapsed / 60, **means, **measured)
+        self.log.write(step=self.step, progress=self.progress, minutes=self.elapsed / 60, **means, **measured)
 
     def keep(self):
         """Writes the checkpoint."""
@@ -138,4 +138,5 @@ class Loop:
         if self.team.leads:
             self.write(measure)
             self.keep()
+            curves.draw(self.log.path, self.args.out + ".png")
         self.team.close()
