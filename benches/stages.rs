@@ -36,7 +36,7 @@ fn stages(c: &mut Criterion) {
     for (size, name) in [(Size::Base, "base"), (Size::Mid, "mid"), (Size::Paper, "paper")] {
         for scheme in [Scheme::F16, Scheme::I8, Scheme::I4] {
             let engine = size.engine(scheme, kernels).expect("an engine");
-            for sampler in [Sampler::Midpoint(4), Sampler::Single] {
+            for sampler in [Sampler::Midpoint4, Sampler::Single] {
                 let mut group = c.benchmark_group(format!("{name}/{scheme}/{sampler}"));
                 for threads in [1, 2] {
                     let options = SessionOptions {

@@ -1,6 +1,9 @@
 //! The types that pass between stages and to the caller.
 
-use crate::error::{Error, ErrorKind, Result};
+mod sampler;
+
+pub use sampler::{EulerSteps, Sampler};
+
 use glam::{Quat, Vec3};
 
 /// Frames of motion a second.
@@ -79,18 +82,6 @@ impl Root {
     }
 }
 
-/// How a block was made.
-#[non_exhaustive]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Sampler {
-    /// Midpoint rule with this many steps (1, 2 or 4), two network evaluations a step.
-    Midpoint(u8),
-    /// Euler's rule with this many steps, one network evaluation a step.
-    Euler(u8),
-    /// The distilled single-step student: one evaluation.
-    Single,
-}
-
 /// One frame of motion for the caller, in world coordinates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
@@ -129,52 +120,8 @@ impl Frame {
             local: vec![Quat::IDENTITY; joints],
             fit_error: 0.0,
             gaze: None,
-            sampler: Sampler::Midpoint(4),
+            sampler: Sampler::Midpoint4,
             held: 0.0,
-        }
-    }
-}
-
-impl std::fmt::Display for Sampler {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Sampler::Midpoint(n) => write!(f, "midpoint{n}"),
-            Sampler::Euler(n) => write!(f, "euler:{n}"),
-            Sampler::Single => f.write_str("single"),
-        }
-    }
-}
-
-impl std::str::FromStr for Sampler {
-    type Err = Error;
-
-    /// Reads `midpoint4`, `midpoint2`, `midpoint1`, `euler:N` (1 to 64) or `single`.
-    fn from_str(s: &str) -> Result<Self> {
-        let wrong = || {
-            let message =
-                format!("unknown sampler {s:?}: midpoint4, midpoint2, midpoint1, euler:N (N 1 to 64) or single");
-            Error::new(ErrorKind::Argument, message)
-        };
-        match s {
-            "midpoint4" => Ok(Sampler::Midpoint(4)),
-            "midpoint2" => Ok(Sampler::Midpoint(2)),
-            "midpoint1" => Ok(Sampler::Midpoint(1)),
-            "single" => Ok(Sampler::Single),
-            _ => match s.strip_prefix("euler:").and_then(|n| n.parse().ok()) {
-                Some(n @ 1..=64) => Ok(Sampler::Euler(n)),
-                _ => Err(wrong()),
-            },
-        }
-    }
-}
-
-impl Sampler {
-    /// Evaluations of the flow network that a block takes.
-    pub fn evaluations(self) -> usize {
-        match self {
-            Sampler::Midpoint(n) => 2 * usize::from(n),
-            Sampler::Euler(n) => usize::from(n),
-            Sampler::Single => 1,
         }
     }
 }

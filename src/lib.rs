@@ -40,6 +40,7 @@ mod frame;
 #[allow(unsafe_code, reason = "SIMD loads, stores and inline assembly")]
 mod kernels;
 mod nn;
+mod normaliser;
 #[allow(unsafe_code, reason = "the fork-join pool hands slices to its worker")]
 mod par;
 mod pose;
@@ -55,7 +56,7 @@ pub use audio::Voice;
 pub use bundle::{BundleFile, LoadMode};
 pub use engine::{Engine, Networks};
 pub use error::{Error, ErrorKind, Result};
-pub use frame::{BLOCK_FRAMES, FPS, Frame, Root, SAMPLE_RATE, Sampler, Transform};
+pub use frame::{BLOCK_FRAMES, EulerSteps, FPS, Frame, Root, SAMPLE_RATE, Sampler, Transform};
 pub use glam;
 pub use rig::{Joint, Rig};
 pub use session::{Budget, Decision, Governor, Hold, Plan, Session, SessionOptions, Team};
@@ -87,7 +88,7 @@ pub mod internals {
         ($($room:ident)*) => { $(pub mod $room { pub use crate::$room::*; })* };
     }
 
-    rooms!(audio bounded bundle config engine flow frame kernels nn par pose session user vae);
+    rooms!(audio bounded bundle config engine flow frame kernels nn normaliser par pose session user vae);
     #[cfg(feature = "quant")]
     rooms!(quant);
 }

@@ -109,7 +109,7 @@ fn long_rest_of_a_sampler() {
     run(&mut session, &inputs, 5);
     session.set_sampler(Sampler::Single).unwrap();
     poll_blocks(&mut session, 40);
-    session.set_sampler(Sampler::Midpoint(4)).unwrap();
+    session.set_sampler(Sampler::Midpoint4).unwrap();
     let frames = poll_blocks(&mut session, 20);
     assert!(frames.iter().flat_map(|f| &f.global).all(|t| t.position.is_finite()));
 }

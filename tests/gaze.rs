@@ -39,8 +39,8 @@ fn targets_and_free_gaze_are_what_the_calibration_says() {
     let (plain, calibrated) = (tiny(), with(&gaze()).unwrap());
     // What was wanted, and the value of the channel that stands for it.
     let cases = [
-        (Sampler::Midpoint(2), Some(0.75), 0.25, GazeControl::Channel),
-        (Sampler::Midpoint(2), None, -0.4, GazeControl::Unguided),
+        (Sampler::Midpoint2, Some(0.75), 0.25, GazeControl::Channel),
+        (Sampler::Midpoint2, None, -0.4, GazeControl::Unguided),
         (Sampler::Single, Some(0.5), 0.5, GazeControl::Channel),
         (Sampler::Single, None, 0.375, GazeControl::Channel),
     ];

@@ -52,7 +52,7 @@ fn heat_is_answered_before_a_deadline_is_missed() {
     let (frames, late) = drive(&mut session, 400, day);
     assert_eq!((late, session.stats().governor.missed), (0, 0));
     let made = |sampler| frames.iter().any(|f| f.sampler == sampler);
-    assert!(made(Sampler::Midpoint(4)) && made(Sampler::Midpoint(2)) && made(Sampler::Single));
+    assert!(made(Sampler::Midpoint4) && made(Sampler::Midpoint2) && made(Sampler::Single));
     assert_eq!(frames.last().map(|f| f.sampler), Some(Sampler::Single));
     assert!(frames.iter().all(|f| f.held == 0.0));
 }
@@ -66,7 +66,7 @@ fn too_slow_for_anything_is_held_and_told() {
     assert!(stats.held_blocks >= 80 && held >= 4 * 80, "{stats:?}");
     assert!(late <= 6 && stats.missed as usize == late, "{late} late blocks, {stats:?}");
     let last = frames.last().unwrap();
-    assert_eq!((last.held, last.sampler), (0.0, Sampler::Midpoint(4)), "and back");
+    assert_eq!((last.held, last.sampler), (0.0, Sampler::Midpoint4), "and back");
     assert!(stats.up >= 2 && stats.down >= 2 && stats.catch_up_passes > 0, "{stats:?}");
     // Breathing is slow, easing is smooth: while a pose is held no joint is faster than 1 m/s.
     for pair in frames.windows(2).filter(|w| w[0].held == 1.0 && w[1].held == 1.0).skip(30) {
@@ -116,17 +116,17 @@ fn a_pinned_sampler_stays() {
     let mut session = engine.session(options()).unwrap();
     drive(&mut session, 30, |_| 1.0);
     session.set_governor(Governor::Off).unwrap();
-    session.set_sampler(Sampler::Midpoint(1)).unwrap();
+    session.set_sampler(Sampler::Midpoint1).unwrap();
     let (frames, _) = drive(&mut session, 30, |_| 50.0);
-    assert!(frames.iter().all(|f| f.sampler == Sampler::Midpoint(1)));
-    session.set_sampler(Sampler::Midpoint(2)).unwrap();
+    assert!(frames.iter().all(|f| f.sampler == Sampler::Midpoint1));
+    session.set_sampler(Sampler::Midpoint2).unwrap();
     session.set_governor(options().governor).unwrap();
     let (frames, _) = drive(&mut session, 60, |_| 0.3);
     assert!(
-        frames.iter().all(|f| matches!(f.sampler, Sampler::Midpoint(2) | Sampler::Single)),
+        frames.iter().all(|f| matches!(f.sampler, Sampler::Midpoint2 | Sampler::Single)),
         "the best is what was set"
     );
-    assert_eq!(frames.last().map(|f| f.sampler), Some(Sampler::Midpoint(2)));
+    assert_eq!(frames.last().map(|f| f.sampler), Some(Sampler::Midpoint2));
 }
 
 #[test]

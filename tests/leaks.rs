@@ -59,7 +59,7 @@ const SLACK: isize = 16 << 10;
 #[test]
 fn engines_and_sessions_leave_nothing_behind() {
     let cycles: usize = std::env::var("VISAVIS_CYCLES").map_or(300, |n| n.parse().expect("a number of sessions"));
-    let samplers = [Sampler::Midpoint(4), Sampler::Single, Sampler::Euler(5)];
+    let samplers = [Sampler::Midpoint4, Sampler::Single, Sampler::euler(5).unwrap()];
     let cycle = |i: usize| {
         let engine = tiny();
         let options = SessionOptions {

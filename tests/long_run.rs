@@ -41,7 +41,7 @@ fn motion(first_block: u64, sampler: Sampler) -> (Vec<Frame>, Session) {
 /// All phases come again after a period: everything else that knows the time must not change a bit either.
 #[test]
 fn whole_periods_later_motion_has_the_same_bits() {
-    for sampler in [Sampler::Midpoint(4), Sampler::Single] {
+    for sampler in [Sampler::Midpoint4, Sampler::Single] {
         let (now, _) = motion(0, sampler);
         for periods in [1, 4] {
             let (later, _) = motion(periods * PERIOD, sampler);
@@ -57,7 +57,7 @@ fn whole_periods_later_motion_has_the_same_bits() {
 /// Positions of tokens enter through rotary phases, which are relative: but for their rounding, motion does not know the hour.
 #[test]
 fn a_day_later_motion_is_the_same() {
-    for sampler in [Sampler::Midpoint(4), Sampler::Single] {
+    for sampler in [Sampler::Midpoint4, Sampler::Single] {
         let (now, first) = motion(0, sampler);
         for blocks in [DAY, 7 * DAY, 60_000_000] {
             let (later, session) = motion(blocks, sampler);

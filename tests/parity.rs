@@ -54,7 +54,7 @@ fn stages_with(golden: &Golden, sampler: Sampler, given: Diagnostics) -> BTreeMa
 #[test]
 fn every_stage_equals_pytorch() {
     let golden = Golden::load();
-    let ours = stages(&golden, Sampler::Midpoint(4), KvDtype::F32);
+    let ours = stages(&golden, Sampler::Midpoint4, KvDtype::F32);
     let audio = golden.get("agent_features").0[1];
     // The user's voice is heard a block late: the last block of the golden features is not reached.
     let checks = [
@@ -90,8 +90,8 @@ fn every_stage_equals_pytorch() {
 fn cheaper_samplers_equal_pytorch() {
     let golden = Golden::load();
     let cases = [
-        (Sampler::Midpoint(2), "latents.midpoint2"),
-        (Sampler::Midpoint(1), "latents.midpoint1"),
+        (Sampler::Midpoint2, "latents.midpoint2"),
+        (Sampler::Midpoint1, "latents.midpoint1"),
         (Sampler::Single, "student"),
     ];
     for (sampler, name) in cases {
@@ -108,7 +108,7 @@ fn clean_history_equals_pytorch() {
     let golden = Golden::load();
     let history = HistoryTime::Clean(CleanHistory { tau: 0.9, from: 0.3 });
     let clean = Diagnostics { cache: KvDtype::F32, history, ..Default::default() };
-    let ours = stages_with(&golden, Sampler::Midpoint(4), clean);
+    let ours = stages_with(&golden, Sampler::Midpoint4, clean);
     let error = max_error(&ours["latents"], &golden.values("latents.clean"));
     println!("clean history: {error:e}");
     assert!(error < TOLERANCE, "latents differ by {error}");
@@ -120,7 +120,7 @@ fn clean_history_equals_pytorch() {
 #[test]
 fn fp16_cache_stays_close() {
     let golden = Golden::load();
-    let ours = stages(&golden, Sampler::Midpoint(4), KvDtype::F16);
+    let ours = stages(&golden, Sampler::Midpoint4, KvDtype::F16);
     let error = max_error(&ours["latents"], &golden.values("latents"));
     println!("fp16 cache: {error:e}");
     assert!(error > 0.0, "the cache is stored in fp16");

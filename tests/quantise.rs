@@ -2,21 +2,35 @@
 
 mod common;
 
-use common::{Inputs, golden_path, motion_of, tiny_f32, tiny_in};
+use common::{Inputs, golden_path, motion_of, tiny, tiny_f32, tiny_in};
+use std::sync::Arc;
 use visavis::internals::bundle::{Contents, int16_activations};
+use visavis::internals::config::{GazeConfig, GazeCurve};
 use visavis::internals::kernels::{Kernels, Scheme};
 use visavis::internals::quant::{Budget, Keep, Options, Scene, Teacher, quantise};
-use visavis::{BundleFile, Engine, ErrorKind, Sampler, SessionOptions};
+use visavis::internals::session::{Anchoring, Diagnostics, GazeControl};
+use visavis::{BundleFile, Engine, ErrorKind, Frame, Sampler, SessionOptions};
 
 fn options(scheme: Scheme, keep: &[Keep]) -> Options<'_> {
     Options { scheme, smallest: 0, keep, calibration: None, budget: None }
 }
 
+/// The tiny bundle with a calibration of gaze, whose free levels change every second or so.
+fn with_gaze() -> Arc<Engine> {
+    let gaze = GazeConfig {
+        guided: GazeCurve(vec![[0.0, -0.5], [1.0, 0.5]]),
+        unguided: GazeCurve(vec![[-1.0, -0.8], [1.0, 0.8]]),
+        student: Some(GazeCurve(vec![[-1.0, -0.25], [1.0, 0.75]])),
+        levels: vec![-0.3, 0.2, 0.9],
+        seconds: 1.0,
+    };
+    let bytes = BundleFile::open(golden_path("tiny.safetensors")).unwrap().with_gaze(&gaze).unwrap();
+    Engine::from_bytes(bytes, "calibrated").unwrap()
+}
+
 fn scene(blocks: usize) -> Scene {
     let inputs = Inputs::circling(4.0, 24_000);
-    // 90 positions a second, 30 frames.
-    let heads: Vec<_> = inputs.path.iter().step_by(3).map(|(_, p)| Some(*p)).take(4 * blocks).collect();
-    Scene::new(&inputs.agent, &inputs.user, &heads, Some(0.5)).unwrap()
+    Scene::new(Some(&inputs.agent), Some(&inputs.user), inputs.path, blocks, Some(0.5)).unwrap()
 }
 
 #[test]
@@ -30,7 +44,7 @@ fn the_same_input_gives_the_same_bytes() {
 #[test]
 fn blocks_stay_close_in_the_order_of_the_schemes() {
     let reference = Engine::from_file(&tiny_f32(), Kernels::detect().unwrap()).unwrap();
-    for sampler in [Sampler::Midpoint(4), Sampler::Single] {
+    for sampler in [Sampler::Midpoint4, Sampler::Single] {
         let teacher = Teacher::new(&reference, scene(12), sampler, 1, &mut None).unwrap();
         let same = teacher.compare(&reference).unwrap();
         assert_eq!((same.mean_mm(), same.round_trip_mm()), (0.0, 0.0), "nothing differs from itself");
@@ -46,6 +60,45 @@ fn blocks_stay_close_in_the_order_of_the_schemes() {
     }
 }
 
+/// What is measured is what a session does: the reference's free run has the bits of a plain session that is driven as any caller drives
+/// it, with free gaze, whose levels are drawn from the calibration, and with a target.
+#[test]
+fn the_teacher_runs_as_a_plain_session_does() {
+    let engine = with_gaze();
+    let inputs = Inputs::circling(6.0, 24_000);
+    let blocks = 30;
+    for (gaze, seed, sampler) in [
+        (None, 3, Sampler::Midpoint4),
+        (None, 4, Sampler::Midpoint4),
+        (Some(0.3), 3, Sampler::Midpoint2),
+        (None, 3, Sampler::Single),
+    ] {
+        let scene = Scene::new(Some(&inputs.agent), Some(&inputs.user), inputs.path.clone(), blocks, gaze).unwrap();
+        let teacher = Teacher::new(&engine, scene.clone(), sampler, seed, &mut None).unwrap();
+        let options =
+            SessionOptions { seed, sampler, gaze, diagnostics: Anchoring::Never.into(), ..Default::default() };
+        let plain = motion_of(&engine, options.clone(), &inputs, blocks);
+        // The gaze of a frame is measured against the head as known by then; it does not steer.
+        let shown =
+            |frames: &[Frame]| -> Vec<Frame> { frames.iter().map(|f| Frame { gaze: None, ..f.clone() }).collect() };
+        let taught: Vec<_> = teacher.frames().cloned().collect();
+        assert_eq!(shown(&taught), shown(&plain), "{sampler}, seed {seed}, gaze {gaze:?}");
+        let channel = Diagnostics { gaze_control: GazeControl::Channel, ..options.diagnostics };
+        let channel = SessionOptions { diagnostics: channel, ..options };
+        assert_ne!(shown(&motion_of(&engine, channel, &inputs, blocks)), shown(&plain), "the calibration is in it");
+        // A candidate that is forced onto what it would make anyway makes it.
+        assert_eq!(teacher.compare(&engine).unwrap().mean_mm(), 0.0);
+    }
+}
+
+/// One that is conditioned otherwise cannot be compared.
+#[test]
+fn another_calibration_is_refused() {
+    let teacher = Teacher::new(&with_gaze(), scene(2), Sampler::Single, 0, &mut None).unwrap();
+    let e = teacher.compare(&tiny()).unwrap_err();
+    assert!(e.kind() == ErrorKind::Argument && e.to_string().contains("calibration"), "{e}");
+}
+
 /// Rounding for the inputs that layers get: better blocks of the same size, and the same bytes every time.
 #[test]
 fn calibrated_rounding_loses_less() {
@@ -58,7 +111,7 @@ fn calibrated_rounding_loses_less() {
         assert_eq!(calibrated.bytes.len(), plain.bytes.len());
         assert!(calibrated.bytes == with().bytes);
         // Other noise than the calibration's.
-        let teacher = Teacher::new(&reference, scene(20), Sampler::Midpoint(4), 5, &mut None).unwrap();
+        let teacher = Teacher::new(&reference, scene(20), Sampler::Midpoint4, 5, &mut None).unwrap();
         let latents = |bytes: Vec<u8>| {
             let forced = teacher.compare(&Engine::from_bytes(bytes, "tiny").unwrap()).unwrap();
             visavis::internals::quant::sqnr_db(&forced.latents[0], &forced.latents[1])

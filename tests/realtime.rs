@@ -73,7 +73,7 @@ fn a_running_session_does_not_allocate() {
         session.push_user_audio(user.next().unwrap(), inputs.rate).unwrap();
 
         let samplers =
-            [Sampler::Midpoint(4), Sampler::Single, Sampler::Midpoint(1), Sampler::Euler(8), Sampler::Midpoint(2)];
+            [Sampler::Midpoint4, Sampler::Single, Sampler::Midpoint1, Sampler::euler(8).unwrap(), Sampler::Midpoint2];
         let calls = allocations(|| {
             for block in 0..100 {
                 session.set_sampler(samplers[block / 7 % samplers.len()]).unwrap();
@@ -93,7 +93,7 @@ fn a_running_session_does_not_allocate() {
         assert!(session.stats().anchorings > 0, "re-anchoring was among what ran");
 
         // The governor with all it does: down the ladder, holding, rehearsing, catching up, and its record of that.
-        session.set_sampler(Sampler::Midpoint(4)).unwrap();
+        session.set_sampler(Sampler::Midpoint4).unwrap();
         session.set_governor(Governor::Budget(Budget::default())).unwrap();
         let calls = allocations(|| {
             for block in 0..300 {
@@ -136,7 +136,7 @@ fn a_running_session_does_not_allocate() {
         let calls = allocations(|| {
             for block in 1..40 {
                 due.iter_mut().for_each(|(session, now)| *now = session.next_due());
-                due[4].0.set_sampler([Sampler::Midpoint(4), Sampler::Single][block / 7 % 2]).unwrap();
+                due[4].0.set_sampler([Sampler::Midpoint4, Sampler::Single][block / 7 % 2]).unwrap();
                 assert_eq!(team.step(&mut due).unwrap(), 5);
             }
         });

@@ -85,7 +85,7 @@ fn confine() -> bool {
 
 fn compute(session: &mut Session, blocks: usize) {
     for block in 0..blocks {
-        let sampler = [Sampler::Midpoint(4), Sampler::Single, Sampler::Midpoint(2)][block / 4 % 3];
+        let sampler = [Sampler::Midpoint4, Sampler::Single, Sampler::Midpoint2][block / 4 % 3];
         let ok = session.set_sampler(sampler).is_ok();
         let now = session.next_due();
         std::hint::black_box(ok && session.poll(now).is_ok_and(|frames| frames.is_some()));

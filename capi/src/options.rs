@@ -121,8 +121,8 @@ pub(crate) fn governor(budget_ms: f32) -> Governor {
 pub(crate) fn sampler(kind: i32, steps: u32) -> Outcome<Sampler> {
     let count = u8::try_from(steps).ok();
     let sampler = match (kind, count) {
-        (0, Some(n)) => Some(Sampler::Midpoint(n)),
-        (1, Some(n)) => Some(Sampler::Euler(n)),
+        (0, Some(n)) => Sampler::midpoint(n).ok(),
+        (1, Some(n)) => Sampler::euler(n).ok(),
         (2, _) => Some(Sampler::Single),
         _ => None,
     };
@@ -132,9 +132,9 @@ pub(crate) fn sampler(kind: i32, steps: u32) -> Outcome<Sampler> {
 /// `(kind, steps)` of a sampler; kind -1 for one that this interface does not know.
 pub(crate) fn sampler_numbers(sampler: Sampler) -> (i32, u32) {
     match sampler {
-        Sampler::Midpoint(n) => (VisavisSamplerKind::Midpoint as i32, u32::from(n)),
-        Sampler::Euler(n) => (VisavisSamplerKind::Euler as i32, u32::from(n)),
         Sampler::Single => (VisavisSamplerKind::Single as i32, 1),
+        Sampler::Euler(steps) => (VisavisSamplerKind::Euler as i32, u32::from(steps.get())),
+        _ if sampler.is_midpoint() => (VisavisSamplerKind::Midpoint as i32, u32::from(sampler.steps())),
         _ => (-1, 0),
     }
 }

@@ -49,7 +49,7 @@ fuzz_target!(|data: &[u8]| {
     // One evaluation of one of the two networks, for every other input: most lies are found out before, and loading is what they are for.
     let sampler = match data.len() % 4 {
         0 => Sampler::Single,
-        1 => Sampler::Euler(1),
+        1 => Sampler::euler(1).expect("one step"),
         _ => return,
     };
     let Ok(mut session) = engine.session(SessionOptions { sampler, ..Default::default() }) else { return };

@@ -56,12 +56,12 @@ enum Step {
 
 fn sampler(i: u8) -> Sampler {
     match i % 6 {
-        0 => Sampler::Midpoint(4),
-        1 => Sampler::Midpoint(i / 6),
+        0 => Sampler::Midpoint4,
+        1 => Sampler::Midpoint1,
         // Mostly few steps.
-        2 if i < 252 => Sampler::Euler(i / 6 % 4),
-        2 => Sampler::Euler(i - 190),
-        3 => Sampler::Midpoint(2),
+        2 if i < 252 => Sampler::euler(1 + i / 6 % 4).expect("1 to 4 steps"),
+        2 => Sampler::euler(i - 190).expect("62 steps and more"),
+        3 => Sampler::Midpoint2,
         _ => Sampler::Single,
     }
 }

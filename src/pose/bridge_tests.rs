@@ -5,6 +5,7 @@ use super::super::{Decoder, Encoder, feature_count, root_of};
 use super::*;
 use crate::frame::{BLOCK_FRAMES, Frame, Root};
 use crate::kernels::Kernels;
+use crate::normaliser::Metric;
 
 const RADIUS: f32 = 0.1;
 
@@ -118,13 +119,13 @@ fn decoder(rig: &Rig, frames: Option<f32>) -> Decoder {
 fn blocks(decoder: &mut Decoder, recording: &Walk) -> Vec<Frame> {
     let mut encoder = Encoder::new(RADIUS);
     let width = feature_count(recording.rig.len());
-    let mut x = vec![0.0; BLOCK_FRAMES * width];
+    let mut x = Metric::zeros(BLOCK_FRAMES * width);
     let mut out = recording.frames.clone();
     for block in out.chunks_exact_mut(BLOCK_FRAMES) {
-        for (frame, x) in block.iter().zip(x.chunks_exact_mut(width)) {
-            encoder.encode(frame.root, &frame.global, x);
+        for (i, frame) in block.iter().enumerate() {
+            encoder.encode(frame.root, &frame.global, x.part_mut(i..i + 1, width));
         }
-        decoder.decode_block(&x, block).unwrap();
+        decoder.decode_block(x.view(), block).unwrap();
     }
     out
 }

@@ -9,6 +9,7 @@ use super::{Fit, Rig};
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{BLOCK_FRAMES, Frame, JOINT_CHANNELS, ROOT_CHANNELS, Root, Transform, feature_count};
 use crate::kernels::Kernels;
+use crate::normaliser::Metric;
 use crate::par::Pool;
 use glam::{Mat3, Quat, Vec3};
 
@@ -27,7 +28,7 @@ pub fn root_of(hips: &Transform, yaw: f64) -> Root {
 
 /// Streaming decoder of feature vectors: integrates the root, places the joints in the world and fits the rig.
 ///
-/// A feature vector `x` holds `F = 3 + 36 J` unstandardised values: `(vx, vz)` the root's displacement since the frame
+/// A feature vector `x` holds `F = 3 + 36 J` values: `(vx, vz)` the root's displacement since the frame
 /// before in that frame's heading frame (m/frame), `dyaw` the turn (rad/frame), then for each joint the 12 vertices of its
 /// icosahedron ([`super::icosahedron`]) in *this* frame's heading frame (origin: the root on the floor; +Z: the heading).
 ///
@@ -126,7 +127,8 @@ impl Decoder {
     ///
     /// # Panics
     /// If `x` is not F long.
-    pub fn prime(&mut self, x: &[f32]) {
+    pub fn prime(&mut self, x: Metric<&[f32]>) {
+        let x = x.into_inner();
         assert_eq!(x.len(), self.feature_count(), "a feature vector has 3 + 36 J values");
         self.transforms(None, x);
         self.guard.prime(&self.joints[..self.previous.len()]);
@@ -140,7 +142,7 @@ impl Decoder {
     ///
     /// # Panics
     /// If `x` is not F long.
-    pub fn decode(&mut self, x: &[f32], frame: &mut Frame) -> Result<()> {
+    pub fn decode(&mut self, x: Metric<&[f32]>, frame: &mut Frame) -> Result<()> {
         self.decode_block(x, std::slice::from_mut(frame))
     }
 
@@ -154,7 +156,7 @@ impl Decoder {
     ///
     /// # Panics
     /// If there are more than four frames, or `x` does not have as many vectors of length F.
-    pub fn decode_block(&mut self, x: &[f32], frames: &mut [Frame]) -> Result<()> {
+    pub fn decode_block(&mut self, x: Metric<&[f32]>, frames: &mut [Frame]) -> Result<()> {
         self.decode_block_on(None, x, frames)
     }
 
@@ -165,8 +167,13 @@ impl Decoder {
     ///
     /// # Panics
     /// As [`Decoder::decode_block`].
-    pub fn decode_block_on(&mut self, pool: Option<&mut Pool>, x: &[f32], frames: &mut [Frame]) -> Result<()> {
-        let mut pool = pool;
+    pub fn decode_block_on(
+        &mut self,
+        mut pool: Option<&mut Pool>,
+        x: Metric<&[f32]>,
+        frames: &mut [Frame],
+    ) -> Result<()> {
+        let x = x.into_inner();
         let (n, width) = (self.previous.len(), self.feature_count());
         assert!(frames.len() <= BLOCK_FRAMES, "a block has at most four frames");
         assert_eq!(x.len(), width * frames.len(), "a feature vector has 3 + 36 J values");
@@ -184,6 +191,19 @@ impl Decoder {
         }
         self.show(pool, frames);
         Ok(())
+    }
+
+    /// Up to four frames for which there are no usable features: the guard treats them as it does features that are not finite.
+    ///
+    /// # Panics
+    /// If there are more than four frames, or no guard.
+    pub fn miss_block_on(&mut self, pool: Option<&mut Pool>, frames: &mut [Frame]) {
+        assert!(self.guarded, "only a guarded decoder can do without features");
+        let n = self.previous.len();
+        for (i, frame) in frames.iter_mut().enumerate() {
+            frame.held = self.guard.miss(&mut self.joints[i * n..(i + 1) * n], &mut self.steps[i]);
+        }
+        self.show(pool, frames);
     }
 
     /// Up to four frames without features: motion eases into a held, breathing pose. Decoding goes on from there in a
@@ -238,7 +258,8 @@ impl Decoder {
     ///
     /// # Panics
     /// If `x` does not have up to four vectors of length F.
-    pub fn shown(&self, x: &mut [f32]) {
+    pub fn shown(&self, mut x: Metric<&mut [f32]>) {
+        let x = x.values_mut();
         let (n, width) = (self.previous.len(), self.feature_count());
         assert!(
             x.len().is_multiple_of(width) && x.len() <= BLOCK_FRAMES * width,
@@ -300,7 +321,7 @@ fn place(joints: &[Transform], root: &Root, frame: &mut Frame) {
     }
 }
 
-/// The way back: world transforms of consecutive frames to unstandardised feature vectors.
+/// The way back: world transforms of consecutive frames to feature vectors.
 ///
 /// With the roots that a [`Decoder`] gave, it returns what the decoder was given, vertices made rigid.
 #[derive(Debug, Clone)]
@@ -325,7 +346,8 @@ impl Encoder {
     ///
     /// # Panics
     /// If `x` is not `3 + 36 J` long.
-    pub fn encode(&mut self, root: Root, global: &[Transform], x: &mut [f32]) {
+    pub fn encode(&mut self, root: Root, global: &[Transform], mut x: Metric<&mut [f32]>) {
+        let x = x.values_mut();
         assert_eq!(x.len(), feature_count(global.len()), "a feature vector has 3 + 36 J values");
         let (head, joints) = x.split_at_mut(ROOT_CHANNELS);
         head.copy_from_slice(&step(self.previous.unwrap_or(root), root));
@@ -354,11 +376,11 @@ mod tests {
 
     const RADIUS: f32 = 0.1;
 
-    fn features(frames: &[Frame]) -> Vec<Vec<f32>> {
+    fn features(frames: &[Frame]) -> Vec<Metric> {
         let mut encoder = Encoder::new(RADIUS);
         let encode = |f: &Frame| {
-            let mut x = vec![0.0; feature_count(f.global.len())];
-            encoder.encode(f.root, &f.global, &mut x);
+            let mut x = Metric::zeros(feature_count(f.global.len()));
+            encoder.encode(f.root, &f.global, x.view_mut());
             x
         };
         frames.iter().map(encode).collect()
@@ -368,7 +390,7 @@ mod tests {
     fn with_and_without_a_pool_are_the_same_bits() {
         let recording = synthetic::walk(160);
         let (n, width) = (recording.rig.len(), feature_count(recording.rig.len()));
-        let mut x = features(&recording.frames).concat();
+        let mut x: Vec<f32> = features(&recording.frames).into_iter().flat_map(Metric::into_inner).collect();
         // A frame that no body can show, and joints off their bones.
         x[70 * width..71 * width].fill(f32::NAN);
         x.iter_mut().enumerate().for_each(|(i, v)| *v += 0.01 * (i as f32 * 0.7).sin());
@@ -384,8 +406,8 @@ mod tests {
             for x in x.chunks((1 + block % BLOCK_FRAMES) * width) {
                 let mut expected = vec![Frame::empty(n); x.len() / width];
                 let mut frames = expected.clone();
-                alone.decode_block(x, &mut expected).unwrap();
-                shared.decode_block_on(Some(&mut pool), x, &mut frames).unwrap();
+                alone.decode_block(Metric::new(x), &mut expected).unwrap();
+                shared.decode_block_on(Some(&mut pool), Metric::new(x), &mut frames).unwrap();
                 assert_eq!(frames, expected, "block {block}");
             }
         }
@@ -400,7 +422,7 @@ mod tests {
         decoder.reset(recording.frames[0].root);
         let mut out = Frame::empty(recording.rig.len());
         for (x, frame) in features(&recording.frames).iter().zip(&recording.frames) {
-            decoder.decode(x, &mut out).unwrap();
+            decoder.decode(x.view(), &mut out).unwrap();
             assert!((out.root.x - frame.root.x).hypot(out.root.z - frame.root.z) < 1e-5);
             for (a, b) in out.global.iter().zip(&frame.global) {
                 assert!(a.position.distance(b.position) < 1e-5, "{} {}", a.position, b.position);
@@ -421,11 +443,11 @@ mod tests {
         let mut encoder = Encoder::new(RADIUS);
         encoder.reset(Some(decoder.root()));
         let mut frame = Frame::empty(recording.rig.len());
-        let mut x = vec![0.0; decoder.feature_count()];
+        let mut x = Metric::zeros(decoder.feature_count());
         for e in &expected {
-            decoder.decode(e, &mut frame).unwrap();
-            encoder.encode(frame.root, &frame.global, &mut x);
-            for (c, (a, b)) in x.iter().zip(e).enumerate() {
+            decoder.decode(e.view(), &mut frame).unwrap();
+            encoder.encode(frame.root, &frame.global, x.view_mut());
+            for (c, (a, b)) in x.values().iter().zip(e.values()).enumerate() {
                 assert!((a - b).abs() < 1e-5, "channel {c}: {a} {b}");
             }
         }
@@ -451,7 +473,7 @@ mod tests {
         decoder.reset(recording.frames[0].root);
         let mut out = Frame::empty(recording.rig.len());
         for x in features(&recording.frames) {
-            decoder.decode(&x, &mut out).unwrap();
+            decoder.decode(x.view(), &mut out).unwrap();
         }
         let last = recording.frames.last().unwrap().root;
         let off = (out.root.x - last.x).hypot(out.root.z - last.z);
@@ -476,12 +498,12 @@ mod tests {
         let (mut a, mut b) = (Frame::empty(22), Frame::empty(22));
         let mut clean = decoder.clone();
         let mut bad = x[0].clone();
-        bad[100] = f32::NAN;
-        assert_eq!(decoder.decode(&bad, &mut a).unwrap_err().kind(), ErrorKind::State);
+        bad.values_mut()[100] = f32::NAN;
+        assert_eq!(decoder.decode(bad.view(), &mut a).unwrap_err().kind(), ErrorKind::State);
         assert_eq!(a, Frame::empty(22));
         for x in &x {
-            decoder.decode(x, &mut a).unwrap();
-            clean.decode(x, &mut b).unwrap();
+            decoder.decode(x.view(), &mut a).unwrap();
+            clean.decode(x.view(), &mut b).unwrap();
             assert_eq!(a, b);
         }
     }

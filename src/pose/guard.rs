@@ -47,7 +47,7 @@ const BREATH_FRAMES: u32 = 4 * FPS;
 pub struct GuardStats {
     /// Times it took over from plausible motion.
     pub trips: u64,
-    /// Frames with a number that is not finite.
+    /// Frames with a number that is not finite, or without any.
     pub non_finite: u64,
     /// Frames with a joint that was too fast or out of reach.
     pub joints: u64,
@@ -72,6 +72,17 @@ enum State {
     Hold,
     /// Frames of the cross-fade that are left.
     Fade(u32),
+}
+
+/// What a frame is like.
+#[derive(Debug, Clone, Copy)]
+struct Verdict {
+    /// There are numbers, and all are finite.
+    finite: bool,
+    /// The joints are within reach and go on from where they were.
+    plausible: bool,
+    /// The root neither jumps nor spins.
+    steady: bool,
 }
 
 /// Judges poses and replaces them where they are not plausible. Streaming; allocates nothing once made.
@@ -147,15 +158,31 @@ impl Guard {
     /// Judges the next frame: `joints` in its heading frame and the root's `step` to it; replaces them where that is needed.
     /// Returns how much of the frame is held, 0 to 1.
     pub(super) fn check(&mut self, joints: &mut [Transform], step: &mut [f32; 3]) -> f32 {
+        let verdict = self.judge(joints, *step);
+        self.answer(verdict, joints, step)
+    }
+
+    /// The next frame, of which nothing usable is known; what `joints` and `step` hold is not looked at.
+    pub(super) fn miss(&mut self, joints: &mut [Transform], step: &mut [f32; 3]) -> f32 {
+        self.answer(Verdict { finite: false, plausible: false, steady: false }, joints, step)
+    }
+
+    fn judge(&self, joints: &[Transform], step: [f32; 3]) -> Verdict {
         let finite = joints.iter().all(finite) && step.iter().all(|v| v.is_finite());
         let fast = MAX_JOINT_SPEED / FPS as f32;
         let plausible = finite && {
             let slow = |(now, before): (&Transform, &Transform)| now.position.distance(before.position) <= fast;
             joints.iter().all(|j| self.near(j)) && (!self.known || joints.iter().zip(&self.decoded).all(slow))
         };
-        let [vx, vz, dyaw] = *step;
+        let [vx, vz, dyaw] = step;
         let steady =
             finite && libm::hypotf(vx, vz) <= MAX_ROOT_SPEED / FPS as f32 && dyaw.abs() <= MAX_TURN_SPEED / FPS as f32;
+        Verdict { finite, plausible, steady }
+    }
+
+    /// Replaces the frame where its verdict says so; returns how much of it is held.
+    fn answer(&mut self, verdict: Verdict, joints: &mut [Transform], step: &mut [f32; 3]) -> f32 {
+        let Verdict { finite, plausible, steady } = verdict;
         self.stats.non_finite += u64::from(!finite);
         self.stats.joints += u64::from(finite && !plausible);
         self.stats.root += u64::from(finite && !steady);

@@ -141,7 +141,7 @@ fn weights_that_overflow_are_held() {
         let engine = Engine::from_bytes(parts.bytes(), NAME).expect("finite weights load");
         let mut session = engine.session(SessionOptions::default()).unwrap();
         let student = visavis::Sampler::Single;
-        for sampler in [visavis::Sampler::Midpoint(4), student] {
+        for sampler in [visavis::Sampler::Midpoint4, student] {
             session.set_sampler(sampler).unwrap();
             let broken = name.starts_with("vae") || (name.starts_with("student") == (sampler == student));
             let mut held = 0;

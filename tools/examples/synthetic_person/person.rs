@@ -130,7 +130,7 @@ pub fn recording(seconds: f32) -> Recording {
         let back = global[5].position + global[5].rotation * Vec3::from(rig.head_back);
         let gaze = (eyes - back).normalize().dot((head - back).normalize());
         let root = Root { x: f64::from(hips.x), z: f64::from(hips.z), yaw: f64::from(yaw) };
-        let sampler = if (300..330).contains(&i) { Sampler::Single } else { Sampler::Midpoint(4) };
+        let sampler = if (300..330).contains(&i) { Sampler::Single } else { Sampler::Midpoint4 };
         frames.push(Frame {
             index: i as u64,
             time: f64::from(t),

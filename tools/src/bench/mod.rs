@@ -44,7 +44,7 @@ pub struct BenchOptions {
 
 impl Default for BenchOptions {
     fn default() -> Self {
-        Self { sampler: Sampler::Midpoint(4), threads: 1, sessions: 1, blocks: 200, allocations: None }
+        Self { sampler: Sampler::Midpoint4, threads: 1, sessions: 1, blocks: 200, allocations: None }
     }
 }
 

@@ -6,7 +6,7 @@ use visavis::internals::kernels::{Kernels, Scheme};
 #[test]
 fn a_bench_is_whole() {
     let engine = Engine::load(concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/goldens/tiny.safetensors")).unwrap();
-    for (sampler, threads) in [(Sampler::Midpoint(4), 1), (Sampler::Single, 2)] {
+    for (sampler, threads) in [(Sampler::Midpoint4, 1), (Sampler::Single, 2)] {
         let bench =
             Bench::run(&engine, BenchOptions { sampler, threads, blocks: 12, ..BenchOptions::default() }).unwrap();
         let [p50, p95, p99, max] = bench.block_ms;

@@ -71,7 +71,7 @@ impl NetworkSet {
                 reference: samplers.iter().any(|sampler| *sampler != Sampler::Single),
                 student: samplers.contains(&Sampler::Single),
                 encoder: false,
-                modulation: samplers.iter().any(|s| matches!(s, Sampler::Euler(n) if ![1, 2, 4, 8].contains(n))),
+                modulation: samplers.iter().any(|s| matches!(s, Sampler::Euler(n) if ![1, 2, 4, 8].contains(&n.get()))),
             },
         }
     }

@@ -84,7 +84,7 @@ impl Default for EvalOptions {
         Self {
             windows: 64,
             threads: 2,
-            samplers: vec![Sampler::Midpoint(4), Sampler::Midpoint(2), Sampler::Midpoint(1), Sampler::Single],
+            samplers: vec![Sampler::Midpoint4, Sampler::Midpoint2, Sampler::Midpoint1, Sampler::Single],
             session: SessionOptions::default(),
             quick: false,
             motion_only: false,

@@ -30,7 +30,7 @@ fn tiny() -> Arc<Engine> {
 
 fn quick(threads: usize) -> Report {
     let engine = tiny();
-    let samplers = vec![Sampler::Midpoint(1), Sampler::Single];
+    let samplers = vec![Sampler::Midpoint1, Sampler::Single];
     let options = EvalOptions { windows: 4, threads, samplers, quick: true, ..EvalOptions::default() };
     evaluate(&engine, &made_up(&engine.config().rig, &talk()), None, &options, &|_| {}).unwrap()
 }
@@ -70,7 +70,7 @@ fn a_report_is_whole_and_the_same_on_any_number_of_threads() {
 fn motion_alone_has_the_same_figures() {
     let engine = tiny();
     let clips = made_up(&engine.config().rig, &talk());
-    let samplers = vec![Sampler::Midpoint(1), Sampler::Single];
+    let samplers = vec![Sampler::Midpoint1, Sampler::Single];
     let whole = EvalOptions { windows: 4, samplers, quick: true, ..EvalOptions::default() };
     let run = |seed| {
         let options = EvalOptions { motion_only: true, seed, ..whole.clone() };

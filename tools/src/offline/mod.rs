@@ -134,10 +134,8 @@ impl Conversation {
     /// # Errors
     /// [`ErrorKind::Argument`] when there is not a whole block.
     pub fn scene(&self, blocks: usize, gaze: Option<f32>) -> Result<Scene> {
-        let frames = BLOCK_FRAMES * blocks.min(self.frames() / BLOCK_FRAMES);
-        let head = |i: usize| self.path().and_then(|p| p.at(i as f64 / f64::from(FPS)));
-        let heads: Vec<_> = (0..frames).map(head).collect();
-        Scene::new(self.agent().unwrap_or_default(), self.user().unwrap_or_default(), &heads, gaze)
+        let heads = self.path.as_ref().map(for_session).unwrap_or_default();
+        Scene::new(self.agent(), self.user(), heads, blocks.min(self.frames() / BLOCK_FRAMES), gaze)
     }
 
     /// The path of the user's head.

@@ -117,7 +117,7 @@ pub(super) fn measure(
     progress: &dyn Fn(&str),
 ) -> Result<Numerics> {
     let student = reference.engine.config().student.map(|_| visavis::Sampler::Single);
-    let samplers = [Some(visavis::Sampler::Midpoint(4)), student];
+    let samplers = [Some(visavis::Sampler::Midpoint4), student];
     let mut activations = Some(Activations::new(ROWS, 5));
     let mut teachers = Vec::new();
     for sampler in samplers.into_iter().flatten() {

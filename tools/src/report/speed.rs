@@ -33,7 +33,7 @@ pub(super) fn measure(loaded: &[&Loaded], blocks: usize, progress: &dyn Fn(&str)
         })
         .collect();
     let student = loaded.iter().all(|l| l.engine.config().student.is_some());
-    let samplers = [Some(Sampler::Midpoint(4)), student.then_some(Sampler::Single)];
+    let samplers = [Some(Sampler::Midpoint4), student.then_some(Sampler::Single)];
     for sampler in samplers.into_iter().flatten() {
         progress(&format!("speed in turns, {sampler}"));
         let options = || SessionOptions { sampler, ..SessionOptions::default() };

@@ -16,8 +16,8 @@ pub(super) const SWITCHES: u64 = 120;
 /// # Errors
 /// Those of a session.
 pub(super) fn measure(engine: &Arc<Engine>, voices: &Voices, switches: u64) -> Result<Option<f64>> {
-    let last = if engine.config().student.is_some() { Sampler::Single } else { Sampler::Midpoint(1) };
-    let ladder = [Sampler::Midpoint(4), Sampler::Midpoint(2), last, Sampler::Midpoint(2)];
+    let last = if engine.config().student.is_some() { Sampler::Single } else { Sampler::Midpoint1 };
+    let ladder = [Sampler::Midpoint4, Sampler::Midpoint2, last, Sampler::Midpoint2];
     let plan = |i: u64| Decision {
         block: i * STAY,
         plan: Plan { sampler: ladder[i as usize % 4], catch_up: None, anchor: true, hold: Hold::No },
@@ -26,7 +26,7 @@ pub(super) fn measure(engine: &Arc<Engine>, voices: &Voices, switches: u64) -> R
     let options = SessionOptions { governor, gaze: Some(0.8), ..SessionOptions::default() };
     let mut session = engine.session(options)?;
     let blocks = STAY * (switches + 1);
-    let mut script = Script::new(voices, engine, Sampler::Midpoint(4), blocks).of_one_sampler();
+    let mut script = Script::new(voices, engine, Sampler::Midpoint4, blocks).of_one_sampler();
     let mut frames = Vec::new();
     for block in 0..blocks {
         script.block(&mut session, block)?;

@@ -15,7 +15,7 @@ fn voices() -> Voices {
 /// what the guard makes of it say nothing; that drift is judged as it should be is tested apart.
 #[test]
 fn a_short_soak_measures_everything() {
-    let soak = Soak { hours: 0.15, from_hour: 24.0, seed: 3, sampler: Sampler::Midpoint(2) };
+    let soak = Soak { hours: 0.15, from_hour: 24.0, seed: 3, sampler: Sampler::Midpoint2 };
     let mut told = Vec::new();
     let report = soak.run(&tiny(), &voices(), None, &mut |hours| told.push(hours)).unwrap();
     assert_eq!((report.blocks, report.cycles.len()), (4050, 3));

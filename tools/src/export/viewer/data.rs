@@ -63,10 +63,9 @@ pub fn json(recording: &Recording, meta: &Meta) -> String {
 
 fn sampler_name(sampler: Sampler) -> String {
     match sampler {
-        Sampler::Midpoint(n) => format!("midpoint {n}"),
-        Sampler::Euler(n) => format!("Euler {n}"),
         Sampler::Single => "single step".to_owned(),
-        other => other.to_string(),
+        Sampler::Euler(steps) => format!("Euler {}", steps.get()),
+        midpoint => format!("midpoint {}", midpoint.steps()),
     }
 }
 
@@ -175,7 +174,7 @@ mod tests {
             frame.global[0].position = frame.hips;
             frame.global[1].position = Vec3::new(1.6, 0.1 + 0.1 * i as f32, -2.0);
             frame.local[1] = Quat::from_rotation_x(0.5);
-            frame.sampler = if i == 2 { Sampler::Single } else { Sampler::Midpoint(4) };
+            frame.sampler = if i == 2 { Sampler::Single } else { Sampler::Midpoint4 };
         }
         frames[1].gaze = Some(0.75);
         let user = vec![None, Some(Vec3::new(0.1, 1.6, 2.0)), None];
