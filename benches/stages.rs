@@ -33,7 +33,7 @@ fn blocks(session: &mut Session, samples: &[f32], blocks: u64, stage: Option<usi
 fn stages(c: &mut Criterion) {
     let kernels = Kernels::detect().expect("kernels");
     let samples: Vec<f32> = (0..BLOCK_SAMPLES).map(|i| 0.2 * (0.04 * i as f32).sin()).collect();
-    for (size, name) in [(Size::Base, "base"), (Size::Paper, "paper")] {
+    for (size, name) in [(Size::Base, "base"), (Size::Mid, "mid"), (Size::Paper, "paper")] {
         for scheme in [Scheme::F16, Scheme::I8, Scheme::I4] {
             let engine = size.engine(scheme, kernels).expect("an engine");
             for sampler in [Sampler::Midpoint4, Sampler::Single] {

@@ -16,7 +16,7 @@ pub struct BenchArgs {
     /// Bundle [default: the shipped one]
     #[arg(long, value_name = "FILE", conflicts_with = "size")]
     pub model: Option<PathBuf>,
-    /// Seeded weights of a size instead of a bundle: paper or base
+    /// Seeded weights of a size instead of a bundle: paper, mid or base
     #[arg(long, value_name = "SIZE")]
     pub size: Option<Size>,
     /// How the weights of --size are stored: f32, f16, i8 or i4
