@@ -1,8 +1,9 @@
 //! Stages of a block of the real networks, from a session's own probe, with seeded weights.
 //!
-//! `cargo bench --bench stages` (add `-- paper/i8` and so on to choose). Each figure is the time of one stage in whole blocks that are
-//! computed one after the other, so caches are in the state that a session leaves them in; `block` is all of them. Re-anchoring
-//! is off: it is spread over blocks, and `visavis bench` shows what it adds.
+//! `cargo bench --bench stages` (add `-- paper/i8` and so on to choose). Each figure is the time of
+//! one stage in whole blocks that are computed one after the other, so caches are in the state that
+//! a session leaves them in; `block` is all of them. Re-anchoring is off: it is spread over blocks,
+//! and `visavis bench` shows what it adds.
 
 use std::time::Duration;
 

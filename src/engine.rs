@@ -307,8 +307,8 @@ impl Engine {
         flows + self.encoder.as_ref().map_or(0, Encoder::bytes) + self.decoder.bytes() + self.audio.bytes()
     }
 
-    /// Bytes of packed weights that a block with `sampler` reads: the flow once an evaluation, the
-    /// decoder once, the audio encoder once a voice. Re-anchoring and slots that catch up come on
+    /// Bytes of packed weights that a block with `sampler` reads: the flow once per evaluation, the
+    /// decoder once, the audio encoder once per voice. Re-anchoring and slots that catch up come on
     /// top.
     pub fn block_bytes(&self, sampler: Sampler) -> usize {
         let nets = self.nets();

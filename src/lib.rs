@@ -47,7 +47,8 @@ pub mod stats {
     pub use crate::user::TrackStats;
 }
 
-/// The governor's decisions, to record ([`Session::decisions`]) and to replay ([`Governor::Replay`]).
+/// The governor's decisions, to record ([`Session::decisions`]) and to replay
+/// ([`Governor::Replay`]).
 pub mod replay {
     pub use crate::session::{Decision, Hold, Plan};
 }

@@ -33,7 +33,8 @@ impl std::str::FromStr for Size {
 }
 
 impl Size {
-    /// An engine of this size whose weights are drawn from a seed and stored as `scheme`; its motion means nothing. There is a student.
+    /// An engine of this size whose weights are drawn from a seed and stored as `scheme`; its
+    /// motion means nothing. There is a student.
     ///
     /// # Errors
     /// None for these sizes; those of [`Engine::from_file`] if they were not sound.
@@ -49,7 +50,8 @@ impl Size {
         Engine::from_tensors(self.config(), &Tensors::seeded(scheme), kernels, networks)
     }
 
-    /// The bytes of a bundle with the weights of [`Size::engine`]: what loading takes can be measured on it.
+    /// The bytes of a bundle with the weights of [`Size::engine`]: what loading takes can be
+    /// measured on it.
     ///
     /// # Errors
     /// As [`Size::engine`].
@@ -95,7 +97,8 @@ impl Size {
                 temperature: 0.75,
                 clean_history: None,
                 bridge: 0.8,
-                // A round takes about a window of blocks; between two of them there are blocks without.
+                // A round takes about a window of blocks; between two of them there are blocks
+                // without.
                 anchor_period: 4 * flow.window_blocks as u32,
                 // The motion of seeded weights goes anywhere: where to says nothing.
                 anchor_radius: 1e6,
