@@ -10,6 +10,7 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::flow::{ConditionLayout, FlowNet, Nets, reference_times, student_times};
 use crate::frame::{BLOCK_FRAMES, Sampler, feature_count};
 use crate::kernels::{Exec, Kernels, KvDtype, Limits};
+use crate::normaliser::{Metric, Normaliser, Standardised};
 use crate::rig::Rig;
 use crate::vae::{Decoder, Encoder};
 use std::path::Path;
@@ -18,17 +19,20 @@ use std::sync::Arc;
 /// Most frames of an idle clip: every session starts by going through them.
 const MAX_IDLE_FRAMES: usize = 3600;
 
-/// Which networks of a bundle an engine holds: what no session will use need not take memory, nor time to load.
+/// Which networks of a bundle an engine holds: what no session will use need not take memory, nor
+/// time to load.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Networks {
-    /// The network of the samplers with steps: midpoint and Euler. Without it sessions need [`Sampler::Single`].
+    /// The network of the samplers with steps: midpoint and Euler. Without it sessions need
+    /// [`Sampler::Single`].
     pub reference: bool,
     /// The student of the single-step sampler, where the bundle has one.
     pub student: bool,
     /// The encoder of motion. Without it sessions do not re-anchor, whatever their options say.
     pub encoder: bool,
-    /// The weights that make the modulation of any flow time, a fifth of a flow network. Without them sessions have the bundle's own flow times:
-    /// [`Sampler::Midpoint`], [`Sampler::Euler`] with 1, 2, 4 or 8 steps, and [`Sampler::Single`].
+    /// The weights that make the modulation of any flow time, a fifth of a flow network. Without
+    /// them sessions have the bundle's own flow times: the midpoint rules, [`Sampler::Euler`] with
+    /// 1, 2, 4 or 8 steps, and [`Sampler::Single`].
     pub modulation: bool,
 }
 
@@ -39,8 +43,8 @@ impl Default for Networks {
     }
 }
 
-/// A loaded model: networks packed for this CPU, rig and statistics. Immutable and shared; all that changes is in
-/// [`Session`](crate::Session).
+/// A loaded model: networks packed for this CPU, rig and statistics. Immutable and shared; all that
+/// changes is in [`Session`](crate::Session).
 ///
 /// ```no_run
 /// # fn main() -> visavis::Result<()> {
@@ -66,30 +70,25 @@ pub struct Engine {
     pub(crate) decoder: Decoder,
     pub(crate) flow: Option<FlowNet>,
     pub(crate) student: Option<FlowNet>,
-    pub(crate) pose: Standard,
-    pub(crate) latent: Standard,
-    /// Latents of the idle clip, `[blocks, latent]`, standardised.
-    pub(crate) idle: Vec<f32>,
-}
-
-/// Mean and standard deviation a channel.
-#[derive(Debug)]
-pub(crate) struct Standard {
-    pub(crate) mean: Vec<f32>,
-    pub(crate) std: Vec<f32>,
+    pub(crate) pose: Normaliser,
+    pub(crate) latent: Normaliser,
+    /// Latents of the idle clip, `[blocks, latent]`.
+    pub(crate) idle: Standardised,
 }
 
 impl Engine {
-    /// Maps and loads the bundle at `path` with the best kernels of this CPU (or those of `VISAVIS_CPU`).
+    /// Maps and loads the bundle at `path` with the best kernels of this CPU (or those of
+    /// `VISAVIS_CPU`).
     ///
     /// # Errors
-    /// [`ErrorKind::Io`], [`ErrorKind::BundleCorrupt`], [`ErrorKind::BundleVersion`], [`ErrorKind::BundleInvalid`],
-    /// each naming the file; [`ErrorKind::CpuLevel`].
+    /// [`ErrorKind::Io`], [`ErrorKind::BundleCorrupt`], [`ErrorKind::BundleVersion`],
+    /// [`ErrorKind::BundleInvalid`], each naming the file; [`ErrorKind::CpuLevel`].
     pub fn load(path: impl AsRef<Path>) -> Result<Arc<Self>> {
         Self::load_with(path, LoadMode::Map)
     }
 
-    /// As [`Engine::load`], mapping the file or copying it first: [`LoadMode`] tells what each of them survives.
+    /// As [`Engine::load`], mapping the file or copying it first: [`LoadMode`] tells what each of
+    /// them survives.
     ///
     /// # Errors
     /// As [`Engine::load`].
@@ -113,6 +112,19 @@ impl Engine {
         Self::from_file(&BundleFile::from_slice(bytes, name), Kernels::detect()?)
     }
 
+    /// Loads the bundle that lies in an open file, `length` bytes from `offset` on (`None`: up to
+    /// the end), such as an asset that is stored uncompressed in an APK. The descriptor stays the
+    /// caller's; its position is neither used nor moved.
+    ///
+    /// # Errors
+    /// As [`Engine::load`]; [`ErrorKind::Argument`] when the file is shorter.
+    #[cfg(unix)]
+    pub fn from_fd(fd: std::os::fd::BorrowedFd<'_>, offset: u64, length: Option<u64>) -> Result<Arc<Self>> {
+        const NAME: &str = "bundle in an open file";
+        let own = fd.try_clone_to_owned().map_err(|e| Error::io("duplicate the descriptor", NAME, e))?;
+        Self::from_bundle(&BundleFile::open_part(&own.into(), offset, length, NAME)?, Networks::default())
+    }
+
     /// Loads some networks of an opened bundle. The others' tensors are not read, so not checked.
     ///
     /// ```no_run
@@ -128,7 +140,8 @@ impl Engine {
     /// ```
     ///
     /// # Errors
-    /// As [`Engine::load`]; [`ErrorKind::Argument`] when neither the reference network nor a student is left.
+    /// As [`Engine::load`]; [`ErrorKind::Argument`] when neither the reference network nor a
+    /// student is left.
     pub fn from_bundle(file: &BundleFile<'_>, networks: Networks) -> Result<Arc<Self>> {
         Self::from_file_with(file, Kernels::detect()?, networks)
     }
@@ -185,7 +198,7 @@ impl Engine {
         // Tensors of a student that the config does not have are not skipped: they are an error.
         let student = config.student.map(|s| net("student", networks.student, student_times(s.tau_history)));
         let student = student.transpose()?.flatten();
-        let flow_times = reference_times(Sampler::Midpoint(4), config.session.clean_history);
+        let flow_times = reference_times(Sampler::Midpoint4, config.session.clean_history);
         let flow = net("flow", networks.reference, flow_times)?;
         let audio_source = AudioSource::load(t, &config.audio)?;
         let encoder = match idle {
@@ -201,9 +214,9 @@ impl Engine {
             decoder: Decoder::load(t, kernels, &config.vae, features)?,
             flow,
             student,
-            pose: Standard::load(t, "stats.pose", features)?,
-            latent: Standard::load(t, "stats.latent", latent)?,
-            idle: Vec::new(),
+            pose: normaliser(t, "stats.pose", features)?,
+            latent: normaliser(t, "stats.latent", latent)?,
+            idle: Standardised::default(),
             #[cfg(feature = "tract")]
             audio_source,
             kernels,
@@ -212,25 +225,26 @@ impl Engine {
         t.finish()?;
         engine.idle = match (idle, &encoder) {
             (Idle::Latents(latents), _) => latents,
-            (Idle::Frames(frames), Some(encoder)) => engine.encode(encoder, &frames)?,
-            (Idle::Frames(_), None) => Vec::new(),
+            (Idle::Frames(frames), Some(encoder)) => engine.encode(encoder, frames.view())?,
+            (Idle::Frames(_), None) => Standardised::default(),
         };
         engine.encoder = encoder.filter(|_| networks.encoder);
         Ok(engine)
     }
 
-    /// Standardised latents `[n / 4, latent]` of `n` consecutive unstandardised feature vectors.
-    fn encode(&self, encoder: &Encoder, frames: &[f32]) -> Result<Vec<f32>> {
-        let (block, latent) = (BLOCK_FRAMES * self.features(), self.latent.mean.len());
+    /// Latents `[n / 4, latent]` of `n` consecutive feature vectors.
+    fn encode(&self, encoder: &Encoder, frames: Metric<&[f32]>) -> Result<Standardised> {
+        let (features, latent) = (self.features(), self.latent.width());
+        let blocks = frames.values().len() / (BLOCK_FRAMES * features);
         let mut exec = self.exec(1)?;
-        let mut state = encoder.state(KvDtype::F32);
-        let mut latents = vec![0.0; frames.len() / block * latent];
-        let mut standardised = vec![0.0; block];
+        let (mut state, mut work) = (encoder.state(KvDtype::F32), self.decoder.work(1));
+        let (mut block, mut z) = (Standardised::zeros(BLOCK_FRAMES * features), Metric::zeros(latent));
+        let mut latents = Standardised::zeros(blocks * latent);
         exec.begin();
-        for (frames, z) in frames.chunks_exact(block).zip(latents.chunks_exact_mut(latent)) {
-            self.pose.standardise(frames, &mut standardised);
-            encoder.step(&mut exec, &mut state, &standardised, z);
-            self.latent.standardise_in_place(z);
+        for i in 0..blocks {
+            self.pose.standardise(frames.part(i..i + 1, BLOCK_FRAMES * features), block.view_mut());
+            encoder.step(&mut exec, &mut work, &mut state, block.view(), z.view_mut());
+            self.latent.standardise(z.view(), latents.part_mut(i..i + 1, latent));
         }
         exec.end();
         Ok(latents)
@@ -240,15 +254,6 @@ impl Engine {
     pub(crate) fn nets(&self) -> Nets<'_> {
         let student = self.student.as_ref().zip(self.config.student.map(|s| s.tau_history));
         Nets { reference: self.flow.as_ref(), student }
-    }
-
-    /// The encoder of motion, for whoever cannot do without.
-    ///
-    /// # Errors
-    /// [`ErrorKind::State`] when it was not loaded.
-    pub(crate) fn encoder(&self) -> Result<&Encoder> {
-        let missing = || Error::new(ErrorKind::State, "this engine was loaded without the encoder; load all networks");
-        self.encoder.as_ref().ok_or_else(missing)
     }
 
     /// The model's name, as its bundle tells it.
@@ -271,7 +276,8 @@ impl Engine {
         self.student.is_some()
     }
 
-    /// The CPU level that the weights are packed for, as `VISAVIS_CPU` names it: `avx512`, `dotprod`, ...
+    /// The CPU level that the weights are packed for, as `VISAVIS_CPU` names it: `avx512`,
+    /// `dotprod`, ...
     pub fn cpu_level(&self) -> &'static str {
         self.kernels.level().name()
     }
@@ -291,7 +297,7 @@ impl Engine {
     /// Blocks of the idle clip, which are the first tokens of every session.
     #[doc(hidden)]
     pub fn idle_blocks(&self) -> usize {
-        self.idle.len() / self.latent.mean.len()
+        self.idle.values().len() / self.latent.width()
     }
 
     /// Bytes of all packed weights.
@@ -301,8 +307,9 @@ impl Engine {
         flows + self.encoder.as_ref().map_or(0, Encoder::bytes) + self.decoder.bytes() + self.audio.bytes()
     }
 
-    /// Bytes of packed weights that a block with `sampler` reads: the flow once an evaluation, the decoder once, the audio
-    /// encoder once a voice. Re-anchoring and slots that catch up come on top.
+    /// Bytes of packed weights that a block with `sampler` reads: the flow once per evaluation, the
+    /// decoder once, the audio encoder once per voice. Re-anchoring and slots that catch up come on
+    /// top.
     pub fn block_bytes(&self, sampler: Sampler) -> usize {
         let nets = self.nets();
         let (pass, condition) = nets.of(sampler).map_or((0, 0), |net| (net.pass_bytes(), net.condition_bytes()));
@@ -311,7 +318,7 @@ impl Engine {
 
     /// Width of a pose feature vector.
     pub(crate) fn features(&self) -> usize {
-        self.pose.mean.len()
+        self.pose.width()
     }
 
     /// Conditioning layout of the flow networks.
@@ -330,16 +337,17 @@ impl Engine {
             [c.vae.width * c.vae.mlp.max(3), self.features(), 4 * c.audio.features, c.vae.latent, c.flow.tau_width];
         let width = flow.into_iter().chain(rest).fold(audio, usize::max);
         // Voices are what is shared out whole.
-        Exec::new(self.kernels, threads, Limits { rows, width })?.with_lanes(Limits { rows, width: audio })
+        Exec::new(self.kernels, threads, Limits { rows, width })?.with_workers(Limits { rows, width: audio })
     }
 }
 
-/// The idle clip, as bundles hold it: exported ones its frames, quantised ones the latents that the encoder made of them.
+/// The idle clip, as bundles hold it: exported ones its frames, quantised ones the latents that the
+/// encoder made of them.
 enum Idle {
     /// Pose features in metres, `[4 blocks, features]`.
-    Frames(Vec<f32>),
-    /// Standardised latents, `[blocks, latent]`.
-    Latents(Vec<f32>),
+    Frames(Metric),
+    /// Latents, `[blocks, latent]`.
+    Latents(Standardised),
 }
 
 impl Idle {
@@ -351,56 +359,20 @@ impl Idle {
                 (blocks, _) if blocks > most => {
                     invalid(format!("tensor {IDLE_LATENTS} has {blocks} blocks, not up to {most}"))
                 }
-                (_, latents) => Ok(Self::Latents(latents)),
+                (_, latents) => Ok(Self::Latents(Standardised::new(latents))),
             };
         }
         match t.f32_rows(IDLE_FRAMES, features)? {
             (frames, _) if frames % BLOCK_FRAMES != 0 || frames > MAX_IDLE_FRAMES => invalid(format!(
                 "tensor {IDLE_FRAMES} has {frames} frames, not a multiple of {BLOCK_FRAMES} up to {MAX_IDLE_FRAMES}"
             )),
-            (_, features) => Ok(Self::Frames(features)),
+            (_, features) => Ok(Self::Frames(Metric::new(features))),
         }
     }
 }
 
-impl Standard {
-    fn load(t: &Tensors<'_>, name: &str, width: usize) -> Result<Self> {
-        let mean = t.f32(&format!("{name}_mean"), &[width])?;
-        let std = t.f32(&format!("{name}_std"), &[width])?;
-        if let Some(i) = std.iter().position(|s| *s <= 0.0) {
-            let message = format!("tensor {name}_std is {} at element {i}; standard deviations are positive", std[i]);
-            return Err(Error::new(ErrorKind::BundleInvalid, message));
-        }
-        Ok(Self { mean, std })
-    }
-
-    /// `(x - mean) / std`, row by row.
-    pub(crate) fn standardise(&self, x: &[f32], out: &mut [f32]) {
-        for (x, out) in x.chunks_exact(self.mean.len()).zip(out.chunks_exact_mut(self.mean.len())) {
-            out.copy_from_slice(x);
-            self.standardise_in_place(out);
-        }
-    }
-
-    pub(crate) fn standardise_in_place(&self, x: &mut [f32]) {
-        for ((x, m), s) in x.iter_mut().zip(&self.mean).zip(&self.std) {
-            *x = (*x - m) / s;
-        }
-    }
-
-    /// `(x - mean) / std`, row by row, in place.
-    pub(crate) fn standardise_all(&self, x: &mut [f32]) {
-        x.chunks_exact_mut(self.mean.len()).for_each(|row| self.standardise_in_place(row));
-    }
-
-    /// `x std + mean`, row by row, in place.
-    pub(crate) fn restore(&self, x: &mut [f32]) {
-        for row in x.chunks_exact_mut(self.mean.len()) {
-            for ((x, m), s) in row.iter_mut().zip(&self.mean).zip(&self.std) {
-                *x = *x * s + m;
-            }
-        }
-    }
+fn normaliser(t: &Tensors<'_>, name: &str, width: usize) -> Result<Normaliser> {
+    Normaliser::new(name, t.f32(&format!("{name}_mean"), &[width])?, t.f32(&format!("{name}_std"), &[width])?)
 }
 
 #[cfg(test)]
@@ -420,13 +392,17 @@ mod tests {
     #[test]
     fn encoder_equals_pytorch() {
         let engine = Engine::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/goldens/tiny.safetensors")).unwrap();
-        let mut expected = golden("encoder.mu");
-        expected.chunks_exact_mut(engine.config.vae.latent).for_each(|mu| engine.latent.standardise_in_place(mu));
-        let latents = engine.encode(engine.encoder().unwrap(), &golden("encoder.frames")).unwrap();
+        let mu = Metric::new(golden("encoder.mu"));
+        let mut expected = Standardised::zeros(mu.values().len());
+        engine.latent.standardise(mu.view(), expected.view_mut());
+        let frames = Metric::new(golden("encoder.frames"));
+        let latents = engine.encode(engine.encoder().unwrap(), frames.view()).unwrap();
+        let (latents, expected) = (latents.values(), expected.values());
         assert_eq!(latents.len(), expected.len());
-        let error = latents.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        let error = latents.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(error < 1e-4, "{error}");
-        let idle = engine.idle.iter().zip(golden("idle.latents")).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        let idle =
+            engine.idle.values().iter().zip(golden("idle.latents")).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(idle < 1e-4, "{idle}");
     }
 }

@@ -1,6 +1,9 @@
 //! The types that pass between stages and to the caller.
 
-use crate::error::{Error, ErrorKind, Result};
+mod sampler;
+
+pub use sampler::{EulerSteps, Sampler};
+
 use glam::{Quat, Vec3};
 
 /// Frames of motion a second.
@@ -13,7 +16,8 @@ pub const SAMPLE_RATE: u32 = 24_000;
 pub const FRAME_SAMPLES: usize = (SAMPLE_RATE / FPS) as usize;
 /// Audio samples in a block.
 pub const BLOCK_SAMPLES: usize = FRAME_SAMPLES * BLOCK_FRAMES;
-/// Explicit root channels at the head of a pose feature vector: `vx`, `vz` (m/frame), `dyaw` (rad/frame).
+/// Explicit root channels at the head of a pose feature vector: `vx`, `vz` (m/frame), `dyaw`
+/// (rad/frame).
 pub const ROOT_CHANNELS: usize = 3;
 /// Feature channels of a joint: 12 icosahedron vertices of 3 coordinates.
 pub const JOINT_CHANNELS: usize = 36;
@@ -68,7 +72,8 @@ impl Root {
         Quat::from_rotation_y(self.yaw as f32)
     }
 
-    /// The root one frame later: moved by `(vx, vz)` of this root's heading frame and turned by `dyaw`.
+    /// The root one frame later: moved by `(vx, vz)` of this root's heading frame and turned by
+    /// `dyaw`.
     #[must_use]
     pub fn advanced(&self, vx: f32, vz: f32, dyaw: f32) -> Self {
         let (s, c) = libm::sincos(self.yaw);
@@ -77,18 +82,6 @@ impl Root {
         let turn = std::f64::consts::TAU;
         Self { x: self.x + c * vx + s * vz, z: self.z - s * vx + c * vz, yaw: yaw - turn * (yaw / turn).round() }
     }
-}
-
-/// How a block was made.
-#[non_exhaustive]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Sampler {
-    /// Midpoint rule with this many steps (1, 2 or 4), two network evaluations a step.
-    Midpoint(u8),
-    /// Euler's rule with this many steps, one network evaluation a step.
-    Euler(u8),
-    /// The distilled single-step student: one evaluation.
-    Single,
 }
 
 /// One frame of motion for the caller, in world coordinates.
@@ -104,7 +97,8 @@ pub struct Frame {
     pub global: Vec<Transform>,
     /// World position of the hips for the fixed-bone-length rig, metres.
     pub hips: Vec3,
-    /// Rotation of each joint relative to its parent on the fixed-bone-length rig (hips: relative to the world).
+    /// Rotation of each joint relative to its parent on the fixed-bone-length rig (hips: relative
+    /// to the world).
     pub local: Vec<Quat>,
     /// Largest distance between a decoded joint position and the rig's, metres.
     pub fit_error: f32,
@@ -112,8 +106,8 @@ pub struct Frame {
     pub gaze: Option<f32>,
     /// What made this frame.
     pub sampler: Sampler,
-    /// How much of the frame is a held pose instead of the model's, 0 to 1: while the model cannot keep up, or gave what no
-    /// body can do, and in the cross-fade after that.
+    /// How much of the frame is a held pose instead of the model's, 0 to 1: while the model cannot
+    /// keep up, or gave what no body can do, and in the cross-fade after that.
     pub held: f32,
 }
 
@@ -129,52 +123,8 @@ impl Frame {
             local: vec![Quat::IDENTITY; joints],
             fit_error: 0.0,
             gaze: None,
-            sampler: Sampler::Midpoint(4),
+            sampler: Sampler::Midpoint4,
             held: 0.0,
-        }
-    }
-}
-
-impl std::fmt::Display for Sampler {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Sampler::Midpoint(n) => write!(f, "midpoint{n}"),
-            Sampler::Euler(n) => write!(f, "euler:{n}"),
-            Sampler::Single => f.write_str("single"),
-        }
-    }
-}
-
-impl std::str::FromStr for Sampler {
-    type Err = Error;
-
-    /// Reads `midpoint4`, `midpoint2`, `midpoint1`, `euler:N` (1 to 64) or `single`.
-    fn from_str(s: &str) -> Result<Self> {
-        let wrong = || {
-            let message =
-                format!("unknown sampler {s:?}: midpoint4, midpoint2, midpoint1, euler:N (N 1 to 64) or single");
-            Error::new(ErrorKind::Argument, message)
-        };
-        match s {
-            "midpoint4" => Ok(Sampler::Midpoint(4)),
-            "midpoint2" => Ok(Sampler::Midpoint(2)),
-            "midpoint1" => Ok(Sampler::Midpoint(1)),
-            "single" => Ok(Sampler::Single),
-            _ => match s.strip_prefix("euler:").and_then(|n| n.parse().ok()) {
-                Some(n @ 1..=64) => Ok(Sampler::Euler(n)),
-                _ => Err(wrong()),
-            },
-        }
-    }
-}
-
-impl Sampler {
-    /// Evaluations of the flow network that a block takes.
-    pub fn evaluations(self) -> usize {
-        match self {
-            Sampler::Midpoint(n) => 2 * usize::from(n),
-            Sampler::Euler(n) => usize::from(n),
-            Sampler::Single => 1,
         }
     }
 }

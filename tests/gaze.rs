@@ -1,4 +1,5 @@
-//! What a calibration of gaze changes: targets go through its curves, free gaze gets its levels, and nothing else.
+//! What a calibration of gaze changes: targets go through its curves, free gaze gets its levels,
+//! and nothing else.
 
 mod common;
 
@@ -39,8 +40,8 @@ fn targets_and_free_gaze_are_what_the_calibration_says() {
     let (plain, calibrated) = (tiny(), with(&gaze()).unwrap());
     // What was wanted, and the value of the channel that stands for it.
     let cases = [
-        (Sampler::Midpoint(2), Some(0.75), 0.25, GazeControl::Channel),
-        (Sampler::Midpoint(2), None, -0.4, GazeControl::Unguided),
+        (Sampler::Midpoint2, Some(0.75), 0.25, GazeControl::Channel),
+        (Sampler::Midpoint2, None, -0.4, GazeControl::Unguided),
         (Sampler::Single, Some(0.5), 0.5, GazeControl::Channel),
         (Sampler::Single, None, 0.375, GazeControl::Channel),
     ];
@@ -62,7 +63,8 @@ fn unguided_is_neither_guided_nor_absent() {
     let unguided = motion(&engine, options(Some(0.3), GazeControl::Unguided));
     assert_ne!(unguided, motion(&engine, options(Some(0.3), GazeControl::Channel)));
     assert_ne!(unguided, motion(&engine, options(None, GazeControl::Channel)));
-    // Without a guidance weight of its own, a guided target has no effect; an unguided one still has.
+    // Without a guidance weight of its own, a guided target has no effect; an unguided one still
+    // has.
     let unweighted = |gaze, gaze_control| {
         let options = options(gaze, gaze_control);
         motion(&engine, SessionOptions { gaze_guidance: Some(0.0), ..options })

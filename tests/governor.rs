@@ -4,9 +4,11 @@ mod common;
 
 use common::{Inputs, poll_blocks, run, tiny};
 use visavis::internals::session::Anchoring;
-use visavis::{Budget, ErrorKind, Frame, Governor, Hold, Sampler, Session, SessionOptions};
+use visavis::replay::Hold;
+use visavis::{Budget, ErrorKind, Frame, Governor, Sampler, Session, SessionOptions};
 
-/// Milliseconds of the last block on a device that is `slow` times slower than one that does eight evaluations in 40 ms.
+/// Milliseconds of the last block on a device that is `slow` times slower than one that does eight
+/// evaluations in 40 ms.
 fn clock(session: &Session, slow: f64) -> f64 {
     let plan = session.decisions().last().expect("a decision").plan;
     let work = match plan.hold {
@@ -52,7 +54,7 @@ fn heat_is_answered_before_a_deadline_is_missed() {
     let (frames, late) = drive(&mut session, 400, day);
     assert_eq!((late, session.stats().governor.missed), (0, 0));
     let made = |sampler| frames.iter().any(|f| f.sampler == sampler);
-    assert!(made(Sampler::Midpoint(4)) && made(Sampler::Midpoint(2)) && made(Sampler::Single));
+    assert!(made(Sampler::Midpoint4) && made(Sampler::Midpoint2) && made(Sampler::Single));
     assert_eq!(frames.last().map(|f| f.sampler), Some(Sampler::Single));
     assert!(frames.iter().all(|f| f.held == 0.0));
 }
@@ -66,7 +68,7 @@ fn too_slow_for_anything_is_held_and_told() {
     assert!(stats.held_blocks >= 80 && held >= 4 * 80, "{stats:?}");
     assert!(late <= 6 && stats.missed as usize == late, "{late} late blocks, {stats:?}");
     let last = frames.last().unwrap();
-    assert_eq!((last.held, last.sampler), (0.0, Sampler::Midpoint(4)), "and back");
+    assert_eq!((last.held, last.sampler), (0.0, Sampler::Midpoint4), "and back");
     assert!(stats.up >= 2 && stats.down >= 2 && stats.catch_up_passes > 0, "{stats:?}");
     // Breathing is slow, easing is smooth: while a pose is held no joint is faster than 1 m/s.
     for pair in frames.windows(2).filter(|w| w[0].held == 1.0 && w[1].held == 1.0).skip(30) {
@@ -99,7 +101,8 @@ fn decisions_replay_bit_for_bit() {
     assert_eq!(again.decisions().collect::<Vec<_>>(), decisions);
 }
 
-/// Without a governor nothing depends on time; and the caller may take the choice back at any moment.
+/// Without a governor nothing depends on time; and the caller may take the choice back at any
+/// moment.
 #[test]
 fn a_pinned_sampler_stays() {
     let inputs = Inputs::circling(common::block_seconds(60), 24_000);
@@ -116,17 +119,17 @@ fn a_pinned_sampler_stays() {
     let mut session = engine.session(options()).unwrap();
     drive(&mut session, 30, |_| 1.0);
     session.set_governor(Governor::Off).unwrap();
-    session.set_sampler(Sampler::Midpoint(1)).unwrap();
+    session.set_sampler(Sampler::Midpoint1).unwrap();
     let (frames, _) = drive(&mut session, 30, |_| 50.0);
-    assert!(frames.iter().all(|f| f.sampler == Sampler::Midpoint(1)));
-    session.set_sampler(Sampler::Midpoint(2)).unwrap();
+    assert!(frames.iter().all(|f| f.sampler == Sampler::Midpoint1));
+    session.set_sampler(Sampler::Midpoint2).unwrap();
     session.set_governor(options().governor).unwrap();
     let (frames, _) = drive(&mut session, 60, |_| 0.3);
     assert!(
-        frames.iter().all(|f| matches!(f.sampler, Sampler::Midpoint(2) | Sampler::Single)),
+        frames.iter().all(|f| matches!(f.sampler, Sampler::Midpoint2 | Sampler::Single)),
         "the best is what was set"
     );
-    assert_eq!(frames.last().map(|f| f.sampler), Some(Sampler::Midpoint(2)));
+    assert_eq!(frames.last().map(|f| f.sampler), Some(Sampler::Midpoint2));
 }
 
 #[test]
@@ -146,7 +149,8 @@ fn bad_budgets_and_times_are_refused() {
     session.report_block_time(5.0).unwrap();
 }
 
-/// The measured clock of `poll` works as well: on any computer the tiny model fits a generous budget.
+/// The measured clock of `poll` works as well: on any computer the tiny model fits a generous
+/// budget.
 #[test]
 fn without_a_reported_time_the_session_measures() {
     let mut session = tiny().session(options()).unwrap();

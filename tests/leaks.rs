@@ -1,8 +1,9 @@
-//! Engines and sessions come and go without a trace: loaded, made, used and dropped, with no memory, thread or file left.
+//! Engines and sessions come and go without a trace: loaded, made, used and dropped, with no
+//! memory, thread or file left.
 //!
-//! `VISAVIS_CYCLES` sets the number of cycles; 300 by default, 10,000 in the figures of the README. Memory is what the allocator was
-//! asked for and not given back, to the byte; resident memory is told too. One test in one binary, so that no other test's threads and memory
-//! are counted.
+//! `VISAVIS_CYCLES` sets the number of cycles; 300 by default, 10,000 in the figures of the README.
+//! Memory is what the allocator was asked for and not given back, to the byte; resident memory is
+//! told too. One test in one binary, so that no other test's threads and memory are counted.
 #![cfg(target_os = "linux")]
 
 mod common;
@@ -59,7 +60,7 @@ const SLACK: isize = 16 << 10;
 #[test]
 fn engines_and_sessions_leave_nothing_behind() {
     let cycles: usize = std::env::var("VISAVIS_CYCLES").map_or(300, |n| n.parse().expect("a number of sessions"));
-    let samplers = [Sampler::Midpoint(4), Sampler::Single, Sampler::Euler(5)];
+    let samplers = [Sampler::Midpoint4, Sampler::Single, Sampler::euler(5).unwrap()];
     let cycle = |i: usize| {
         let engine = tiny();
         let options = SessionOptions {
@@ -97,8 +98,8 @@ fn engines_and_sessions_leave_nothing_behind() {
     );
     assert_eq!(before[3], after[3], "files are left open");
     assert!(after[0] - before[0] < SLACK, "{} bytes more in use after {cycles} cycles", after[0] - before[0]);
-    // A leak around the allocator (a mapping, a thread's stack) would be megabytes a cycle; what the C library keeps for the threads
-    // of 300 sessions was seen to be 12 MB.
+    // A leak around the allocator (a mapping, a thread's stack) would be megabytes a cycle; what
+    // the C library keeps for the threads of 300 sessions was seen to be 12 MB.
     let grown = after[1] - before[1];
     assert!(grown < 32 << 20, "{grown} bytes more resident after {cycles} cycles");
 }

@@ -1,8 +1,10 @@
-//! The same motion on every machine: digests of all bits of all frames, compared with `tests/goldens/digests.txt`.
+//! The same motion on every machine: digests of all bits of all frames, compared with
+//! `tests/goldens/digests.txt`.
 //!
-//! Whatever changes the numbers on purpose (pose stage, stance, samplers, guidance, anchoring, the tiny bundle) changes the
-//! digests: run `VISAVIS_DIGESTS=write cargo test --test machines` and commit the file. A difference between two machines
-//! is a fault: sums must have a fixed order, and functions such as sine must come from `libm`, not from the platform.
+//! Whatever changes the numbers on purpose (pose stage, stance, samplers, guidance, anchoring, the
+//! tiny bundle) changes the digests: run `VISAVIS_DIGESTS=write cargo test --test machines` and
+//! commit the file. A difference between two machines is a fault: sums must have a fixed order, and
+//! functions such as sine must come from `libm`, not from the platform.
 
 mod common;
 
@@ -57,13 +59,13 @@ fn cases() -> Vec<(&'static str, u32, SessionOptions)> {
         ("gaze 0.8, 48 kHz", 48_000, gaze(0.8)),
         ("gaze 0, 44.1 kHz, two threads", 44_100, SessionOptions { threads: 2, ..gaze(0.0) }),
         ("gaze 1, 16 kHz, seed 7", 16_000, SessionOptions { seed: 7, ..gaze(1.0) }),
-        ("midpoint2, 8 kHz", 8_000, sampler(Sampler::Midpoint(2))),
+        ("midpoint2, 8 kHz", 8_000, sampler(Sampler::Midpoint2)),
         (
             "midpoint1, 22.05 kHz, f32 cache",
             22_050,
-            SessionOptions { diagnostics: wide, ..sampler(Sampler::Midpoint(1)) },
+            SessionOptions { diagnostics: wide, ..sampler(Sampler::Midpoint1) },
         ),
-        ("euler:5, 96 kHz", 96_000, sampler(Sampler::Euler(5))),
+        ("euler:5, 96 kHz", 96_000, sampler(Sampler::euler(5).unwrap())),
         ("single, 48 kHz", 48_000, sampler(Sampler::Single)),
         ("single, 11.025 kHz, two threads", 11_025, SessionOptions { threads: 2, ..sampler(Sampler::Single) }),
         ("no stance, guidance 3, 24 kHz", 24_000, SessionOptions { stance: false, guidance: Some(3.0), ..gaze(0.5) }),

@@ -1,4 +1,5 @@
-//! Engines that hold some networks of a bundle only: the same motion in less memory, and typed refusals.
+//! Engines that hold some networks of a bundle only: the same motion in less memory, and typed
+//! refusals.
 
 mod common;
 
@@ -21,9 +22,9 @@ fn what_is_left_makes_the_same_motion_in_less_memory() {
     let all = Networks::default();
     for (networks, sampler) in [
         (Networks { reference: false, ..all }, Sampler::Single),
-        (Networks { student: false, ..all }, Sampler::Midpoint(4)),
+        (Networks { student: false, ..all }, Sampler::Midpoint4),
         (Networks { reference: false, encoder: false, ..all }, Sampler::Single),
-        (Networks { student: false, encoder: false, ..all }, Sampler::Euler(3)),
+        (Networks { student: false, encoder: false, ..all }, Sampler::euler(3).unwrap()),
     ] {
         let part = load(networks).expect("it loads");
         assert!(part.weight_bytes() < whole.weight_bytes());
@@ -37,7 +38,8 @@ fn what_is_left_makes_the_same_motion_in_less_memory() {
     }
 }
 
-/// A quantised copy of the tiny bundle: it holds latents of the idle clip, so a lean engine reads no encoder.
+/// A quantised copy of the tiny bundle: it holds latents of the idle clip, so a lean engine reads
+/// no encoder.
 fn quantised() -> Vec<u8> {
     let file = BundleFile::open(golden_path("tiny.safetensors")).expect("the tiny bundle opens");
     let options = Options { scheme: Scheme::I8, smallest: 0, keep: &[], calibration: None, budget: None };
@@ -54,12 +56,12 @@ fn tables_of_flow_times_make_the_same_motion_without_their_weights() {
     };
     let (whole, lean) = (load(true, true), load(false, false));
     assert!(lean.weight_bytes() < whole.weight_bytes());
-    for sampler in [Sampler::Midpoint(4), Sampler::Midpoint(1), Sampler::Euler(4), Sampler::Single] {
+    for sampler in [Sampler::Midpoint4, Sampler::Midpoint1, Sampler::euler(4).unwrap(), Sampler::Single] {
         let options = SessionOptions { sampler, diagnostics: Anchoring::Never.into(), ..Default::default() };
         let [mut a, mut b] = [&lean, &whole].map(|engine| engine.session(options.clone()).expect("session"));
         let blocks = |session: &mut _| {
             let mut frames = common::poll_blocks(session, 12);
-            let other = if sampler == Sampler::Single { Sampler::Midpoint(2) } else { Sampler::Single };
+            let other = if sampler == Sampler::Single { Sampler::Midpoint2 } else { Sampler::Single };
             session.set_sampler(other).expect("its flow times are in the table");
             frames.extend(common::poll_blocks(session, 12));
             frames
@@ -73,7 +75,7 @@ fn flow_times_outside_the_table_take_the_weights() {
     let lean = load(Networks { modulation: false, ..Networks::default() }).expect("it loads");
     let clean = HistoryTime::Clean(CleanHistory { tau: 0.83, from: 0.4 });
     for options in [
-        SessionOptions { sampler: Sampler::Euler(3), ..Default::default() },
+        SessionOptions { sampler: Sampler::euler(3).unwrap(), ..Default::default() },
         SessionOptions { diagnostics: Diagnostics { history: clean, ..Default::default() }, ..Default::default() },
     ] {
         let refused = lean.session(options.clone()).expect_err("refused");
@@ -82,8 +84,8 @@ fn flow_times_outside_the_table_take_the_weights() {
         tiny().session(options).expect("an engine with the weights has them all");
     }
     let mut session = lean.session(SessionOptions::default()).expect("session");
-    session.set_sampler(Sampler::Euler(3)).expect_err("refused later too");
-    session.set_sampler(Sampler::Euler(8)).expect("on the grid");
+    session.set_sampler(Sampler::euler(3).unwrap()).expect_err("refused later too");
+    session.set_sampler(Sampler::euler(8).unwrap()).expect("on the grid");
 }
 
 #[test]
@@ -104,14 +106,14 @@ fn what_is_missing_is_refused_by_name() {
     let neither = load(Networks { reference: false, student: false, ..all }).expect_err("nothing to make motion with");
     assert_eq!(neither.kind(), ErrorKind::Argument);
     for (networks, sampler, missing) in [
-        (Networks { reference: false, ..all }, Sampler::Midpoint(4), "reference network"),
+        (Networks { reference: false, ..all }, Sampler::Midpoint4, "reference network"),
         (Networks { student: false, ..all }, Sampler::Single, "student network"),
     ] {
         let engine = load(networks).expect("it loads");
         let refused = engine.session(SessionOptions { sampler, ..Default::default() }).expect_err("refused");
         assert_eq!(refused.kind(), ErrorKind::Argument);
         assert!(refused.to_string().contains(missing), "{refused}");
-        let other = if sampler == Sampler::Single { Sampler::Midpoint(2) } else { Sampler::Single };
+        let other = if sampler == Sampler::Single { Sampler::Midpoint2 } else { Sampler::Single };
         let mut session = engine.session(SessionOptions { sampler: other, ..Default::default() }).expect("session");
         let refused = session.set_sampler(sampler).expect_err("refused later too");
         assert!(refused.to_string().contains(missing), "{refused}");

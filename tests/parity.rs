@@ -1,7 +1,7 @@
 //! The runtime equals PyTorch, stage by stage: 1e-4 in fp32.
 //!
-//! The golden file was computed without caches, every token anew at each evaluation, over more than three windows; so
-//! these tests also show that the cache of each slot is exact.
+//! The golden file was computed without caches, every token anew at each evaluation, over more than
+//! three windows; so these tests also show that the cache of each slot is exact.
 
 mod common;
 
@@ -54,7 +54,7 @@ fn stages_with(golden: &Golden, sampler: Sampler, given: Diagnostics) -> BTreeMa
 #[test]
 fn every_stage_equals_pytorch() {
     let golden = Golden::load();
-    let ours = stages(&golden, Sampler::Midpoint(4), KvDtype::F32);
+    let ours = stages(&golden, Sampler::Midpoint4, KvDtype::F32);
     let audio = golden.get("agent_features").0[1];
     // The user's voice is heard a block late: the last block of the golden features is not reached.
     let checks = [
@@ -90,8 +90,8 @@ fn every_stage_equals_pytorch() {
 fn cheaper_samplers_equal_pytorch() {
     let golden = Golden::load();
     let cases = [
-        (Sampler::Midpoint(2), "latents.midpoint2"),
-        (Sampler::Midpoint(1), "latents.midpoint1"),
+        (Sampler::Midpoint2, "latents.midpoint2"),
+        (Sampler::Midpoint1, "latents.midpoint1"),
         (Sampler::Single, "student"),
     ];
     for (sampler, name) in cases {
@@ -108,19 +108,19 @@ fn clean_history_equals_pytorch() {
     let golden = Golden::load();
     let history = HistoryTime::Clean(CleanHistory { tau: 0.9, from: 0.3 });
     let clean = Diagnostics { cache: KvDtype::F32, history, ..Default::default() };
-    let ours = stages_with(&golden, Sampler::Midpoint(4), clean);
+    let ours = stages_with(&golden, Sampler::Midpoint4, clean);
     let error = max_error(&ours["latents"], &golden.values("latents.clean"));
     println!("clean history: {error:e}");
     assert!(error < TOLERANCE, "latents differ by {error}");
     assert!(max_error(&golden.values("latents.clean"), &golden.values("latents")) > 0.01, "it is another sampler");
 }
 
-/// fp16 rounds keys and values to 11 bits (relative 5e-4); over 20 free-running blocks with random weights that stays
-/// below 2e-2 of a latent of unit scale.
+/// fp16 rounds keys and values to 11 bits (relative 5e-4); over 20 free-running blocks with random
+/// weights that stays below 2e-2 of a latent of unit scale.
 #[test]
 fn fp16_cache_stays_close() {
     let golden = Golden::load();
-    let ours = stages(&golden, Sampler::Midpoint(4), KvDtype::F16);
+    let ours = stages(&golden, Sampler::Midpoint4, KvDtype::F16);
     let error = max_error(&ours["latents"], &golden.values("latents"));
     println!("fp16 cache: {error:e}");
     assert!(error > 0.0, "the cache is stored in fp16");

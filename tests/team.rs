@@ -19,7 +19,7 @@ fn sessions(engine: &Arc<Engine>, inputs: &Inputs) -> Vec<Session> {
         SessionOptions { seed: 1, gaze: Some(0.7), guidance: Some(2.0), ..usual.clone() },
         SessionOptions { seed: 2, diagnostics: late, temperature: Some(0.5), ..usual.clone() },
         SessionOptions { seed: 3, sampler: Sampler::Single, ..usual.clone() },
-        SessionOptions { seed: 4, sampler: Sampler::Euler(3), ..usual.clone() },
+        SessionOptions { seed: 4, sampler: Sampler::euler(3).unwrap(), ..usual.clone() },
         SessionOptions { seed: 5, sampler: Sampler::Single, diagnostics: Anchoring::Never.into(), ..usual },
     ];
     let session = |options: SessionOptions| {
@@ -38,7 +38,7 @@ fn event(session: &mut Session, i: usize, block: usize) {
         session.set_gaze((i == 0).then_some(0.2)).expect("gaze");
     }
     if i == 2 && (25..40).contains(&block) && block.is_multiple_of(5) {
-        let sampler = [Sampler::Midpoint(1), Sampler::Single, Sampler::Midpoint(4)][block / 5 % 3];
+        let sampler = [Sampler::Midpoint1, Sampler::Single, Sampler::Midpoint4][block / 5 % 3];
         session.set_sampler(sampler).expect("sampler");
     }
 }

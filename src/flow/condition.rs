@@ -34,7 +34,8 @@ impl ConditionLayout {
     }
 }
 
-/// Conditioning of one token (one block). A modality that is absent has its flag off; its values are not looked at.
+/// Conditioning of one token (one block). A modality that is absent has its flag off; its values
+/// are not looked at.
 ///
 /// This is the seam of the generator: whatever produces motion takes a `Condition` a block.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,21 +77,18 @@ impl Condition {
         self.present[2] = true;
     }
 
-    /// Gaze target, -1 to 1, the same for the four frames. `guided`: towards it, with a guidance weight of its own; else it is a
-    /// condition among the others. The student, which has its guidance in its weights, makes no difference.
+    /// Gaze target, -1 to 1, the same for the four frames. `guided`: towards it, with a guidance
+    /// weight of its own; else it is a condition among the others. The student, which has its
+    /// guidance in its weights, makes no difference.
     pub fn set_gaze(&mut self, target: f32, guided: bool) {
         self.values[self.layout.gaze()].fill(target);
         (self.present[3], self.guided) = (true, guided);
     }
 
-    /// Whether a gaze target is guided towards, so that the reference network has a third branch to run.
+    /// Whether a gaze target is guided towards, so that the reference network has a third branch to
+    /// run.
     pub fn guides_gaze(&self) -> bool {
         self.present[3] && self.guided
-    }
-
-    /// The user's positions as given, when present.
-    pub fn user(&self) -> Option<&[f32]> {
-        self.present[0].then(|| &self.values[self.layout.user()])
     }
 
     pub(super) fn copy_from(&mut self, other: &Self) {

@@ -1,9 +1,10 @@
-//! The last tokens of a session: latent, noise and conditioning. Shared by the reference network and the student.
+//! The last tokens of a session: latent, noise and conditioning. Shared by the reference network
+//! and the student.
 
 use super::{Condition, ConditionLayout};
 
-/// A ring of tokens. Token `len()` is the one being made: its noise and conditioning are set by [`History::begin`], its
-/// latent by [`History::finish`].
+/// A ring of tokens. Token `len()` is the one being made: its noise and conditioning are set by
+/// [`History::begin`], its latent by [`History::finish`].
 #[derive(Debug)]
 pub struct History {
     capacity: usize,
@@ -44,47 +45,42 @@ impl History {
         self.len == self.first
     }
 
-    /// Index of the first token that there ever was.
-    pub fn first(&self) -> u64 {
-        self.first
-    }
-
     /// Sets the conditioning of the token being made and hands out its noise to be filled.
     pub fn begin(&mut self, condition: &Condition) -> &mut [f32] {
-        let slot = self.slot(self.len);
-        self.conditions[slot].copy_from(condition);
-        &mut self.eps[slot * self.latent..][..self.latent]
+        let at = self.at(self.len);
+        self.conditions[at].copy_from(condition);
+        &mut self.eps[at * self.latent..][..self.latent]
     }
 
     /// Sets the latent of the token being made, which is finished by this.
     pub fn finish(&mut self, z: &[f32]) {
-        let slot = self.slot(self.len);
-        self.z[slot * self.latent..][..self.latent].copy_from_slice(z);
+        let at = self.at(self.len);
+        self.z[at * self.latent..][..self.latent].copy_from_slice(z);
         self.len += 1;
     }
 
     /// Replaces the latent of a finished token (re-anchoring).
     pub fn replace(&mut self, token: u64, z: &[f32]) {
-        let slot = self.slot(token);
-        self.z[slot * self.latent..][..self.latent].copy_from_slice(z);
+        let at = self.at(token);
+        self.z[at * self.latent..][..self.latent].copy_from_slice(z);
     }
 
     /// Standardised latent of a finished token.
     pub fn z(&self, token: u64) -> &[f32] {
-        &self.z[self.slot(token) * self.latent..][..self.latent]
+        &self.z[self.at(token) * self.latent..][..self.latent]
     }
 
     /// Noise of a token.
     pub fn eps(&self, token: u64) -> &[f32] {
-        &self.eps[self.slot(token) * self.latent..][..self.latent]
+        &self.eps[self.at(token) * self.latent..][..self.latent]
     }
 
     /// Conditioning of a token.
     pub fn condition(&self, token: u64) -> &Condition {
-        &self.conditions[self.slot(token)]
+        &self.conditions[self.at(token)]
     }
 
-    fn slot(&self, token: u64) -> usize {
+    fn at(&self, token: u64) -> usize {
         debug_assert!(token <= self.len && token + self.capacity as u64 > self.len);
         (token % self.capacity as u64) as usize
     }

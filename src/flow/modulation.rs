@@ -1,11 +1,11 @@
-//! Modulation vectors of flow times (AdaLN-Zero; Peebles and Xie 2023): they depend on the flow time alone, so they are tabulated and `6 d^2` weights
-//! a layer stay out of the hot path.
+//! Modulation vectors of flow times (AdaLN-Zero; Peebles and Xie 2023): they depend on the flow
+//! time alone, so they are tabulated and `6 d^2` weights per layer stay out of the hot path.
 
 use crate::bundle::Tensors;
 use crate::config::FlowConfig;
 use crate::error::{Error, ErrorKind, Result};
 use crate::kernels::{Epilogue, Exec, Kernels, Limits, Matrix, RowTable};
-use crate::nn::LayerNorms;
+use crate::nn::{LayerNorms, Norms};
 use std::sync::Arc;
 
 /// Where a network gets its modulation from; used when sessions start, never in a block.
@@ -28,8 +28,8 @@ pub(super) struct TauWeights {
 
 /// AdaLN-Zero shift, scale and gate of every layer for a list of flow times.
 ///
-/// One row of the table a flow time: six vectors a layer (shift, 1 + scale, gate of the attention, then of the feed-forward), then the
-/// final shift and 1 + scale.
+/// One row of the table per flow time: six vectors per layer (shift, 1 + scale, gate of the
+/// attention, then of the feed-forward), then the final shift and 1 + scale.
 #[derive(Debug)]
 pub struct Modulation {
     times: Vec<f32>,
@@ -126,15 +126,15 @@ impl Modulation {
     fn rows<'a>(&'a self, vector: usize, index: &'a [u32]) -> RowTable<'a> {
         RowTable { table: &self.table, stride: self.stride(), offset: vector * self.width, index }
     }
+}
 
-    /// Norms and gates of layer `layer`; `index` holds the flow time's number of each row.
-    pub(super) fn layer<'a>(&'a self, layer: usize, index: &'a [u32]) -> LayerNorms<'a> {
+impl Norms for Modulation {
+    fn layer<'a>(&'a self, layer: usize, index: &'a [u32]) -> LayerNorms<'a> {
         let v = |i| self.rows(layer * 6 + i, index);
         LayerNorms { norm1: (v(0), v(1)), gate1: Some(v(2)), norm2: (v(3), v(4)), gate2: Some(v(5)) }
     }
 
-    /// Final shift and scale.
-    pub(super) fn last<'a>(&'a self, index: &'a [u32]) -> (RowTable<'a>, RowTable<'a>) {
+    fn last<'a>(&'a self, index: &'a [u32]) -> (RowTable<'a>, RowTable<'a>) {
         (self.rows(self.layers * 6, index), self.rows(self.layers * 6 + 1, index))
     }
 }

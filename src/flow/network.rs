@@ -6,7 +6,7 @@ use crate::bundle::Tensors;
 use crate::config::FlowConfig;
 use crate::error::Result;
 use crate::kernels::{Epilogue, Exec, Kernels, Matrix, WeightData, Weights};
-use crate::nn::{Attention, Layer, Phases, Rope, Scratch, run_layers};
+use crate::nn::{Layer, Pass, Rope, Sizes};
 use std::sync::Arc;
 
 /// Weights of a flow network, reference or student.
@@ -15,9 +15,11 @@ pub struct FlowNet {
     config: FlowConfig,
     latent: usize,
     layout: ConditionLayout,
-    /// `W_in[:, latent part] W_latent`: the latent's embedding folded into the input projection, `[d, latent]`.
+    /// `W_in[:, latent part] W_latent`: the latent's embedding folded into the input projection,
+    /// `[d, latent]`.
     input_latent: Matrix,
-    /// The rest of the input projection, `[d, embeddings + 4 flags]`; its bias holds the latent embedding's too.
+    /// The rest of the input projection, `[d, embeddings + 4 flags]`; its bias holds the latent
+    /// embedding's too.
     input_rest: Matrix,
     /// `input_rest` of a token with everything absent.
     unconditional: Vec<f32>,
@@ -26,13 +28,14 @@ pub struct FlowNet {
     embed_user_voice: Matrix,
     embed_gaze: Matrix,
     layers: Vec<Layer>,
-    pub(super) out: Matrix,
-    pub(super) rope: Rope,
+    out: Matrix,
+    rope: Rope,
     modulator: Modulator,
 }
 
 impl FlowNet {
-    /// Reads `{prefix}.*` (`flow` or `student`). With `times` the modulation weights are not kept, but a table of these flow times.
+    /// Reads `{prefix}.*` (`flow` or `student`). With `times` the modulation weights are not kept,
+    /// but a table of these flow times.
     ///
     /// # Errors
     /// As [`Tensors::f32`].
@@ -90,22 +93,23 @@ impl FlowNet {
         })
     }
 
-    /// Runs `n` rows of `x` through the layers, with the modulation that each row's entry of `index` says.
-    #[allow(clippy::too_many_arguments, reason = "a pass needs all of them, and they have no natural owner")]
-    pub(super) fn run(
-        &self,
-        exec: &mut Exec,
-        modulation: &Modulation,
-        index: &[u32],
-        phases: &Phases,
-        n: usize,
-        scratch: &mut Scratch,
-        x: &mut [f32],
-        attention: &mut Attention<'_>,
-    ) {
-        let layers = self.layers.iter().enumerate().map(|(i, layer)| (layer, modulation.layer(i, index)));
-        // The next evaluation begins with the first layer again.
-        run_layers(exec, self.config().heads, layers, self.layers.first(), phases, n, scratch, x, attention);
+    /// A pass for up to `rows` rows.
+    pub(super) fn pass(&self, rows: usize) -> Pass {
+        let FlowConfig { width, heads, mlp, .. } = self.config;
+        Pass::new(Sizes { width, heads, hidden: width * mlp }, rows, &self.rope)
+    }
+
+    pub(super) fn layers(&self) -> &[Layer] {
+        &self.layers
+    }
+
+    pub(super) fn rope(&self) -> &Rope {
+        &self.rope
+    }
+
+    /// The projection of normed rows to latents.
+    pub(super) fn out(&self) -> &Matrix {
+        &self.out
     }
 
     /// Bytes of the packed matrices that one evaluation reads.
@@ -119,7 +123,8 @@ impl FlowNet {
         embeds.into_iter().chain([&self.embed_gaze, &self.input_rest]).map(Matrix::bytes).sum()
     }
 
-    /// Bytes of what flow times are turned into modulation with, read when a session starts: packed matrices, or a table.
+    /// Bytes of what flow times are turned into modulation with, read when a session starts: packed
+    /// matrices, or a table.
     pub fn modulation_bytes(&self) -> usize {
         self.modulator.bytes()
     }
@@ -149,9 +154,9 @@ impl FlowNet {
         exec.linear(&self.input_latent, z, rows, y, Epilogue::Store);
     }
 
-    /// Input of a token's conditioning, `out` `[2, d]`: without a guided gaze target, and with it (the same if there is none, or
-    /// if it is not guided towards).
-    /// `embedded` is scratch of `2 x rest_width`.
+    /// Input of a token's conditioning, `out` `[2, d]`: without a guided gaze target, and with it
+    /// (the same if there is none, or if it is not guided towards). `embedded` is scratch of `2 x
+    /// rest_width`.
     pub(super) fn project(&self, exec: &mut Exec, condition: &Condition, embedded: &mut [f32], out: &mut [f32]) {
         let (c, rest) = (&self.config, self.rest_width());
         let layout = condition.layout();
@@ -196,7 +201,8 @@ impl FlowNet {
     /// Modulation of the given flow times.
     ///
     /// # Errors
-    /// [`crate::error::ErrorKind::Argument`] when the weights for it were not kept, and these are not the times of the table in their place.
+    /// [`crate::error::ErrorKind::Argument`] when the weights for it were not kept, and these are
+    /// not the times of the table in their place.
     pub fn modulation(&self, exec: &mut Exec, times: &[f32]) -> Result<Arc<Modulation>> {
         self.modulator.modulation(exec, &self.config, times)
     }

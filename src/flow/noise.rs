@@ -1,7 +1,7 @@
 //! Standard normal noise as a pure function of (seed, token, channel).
 //!
-//! Philox4x32-10 (Salmon et al. 2011) turns a counter into 128 random bits; Box-Muller turns them into normals. The
-//! arithmetic is f64 from `libm`, so every platform gets the same bits.
+//! Philox4x32-10 (Salmon et al. 2011) turns a counter into 128 random bits; Box-Muller turns them
+//! into normals. The arithmetic is f64 from `libm`, so every platform gets the same bits.
 
 /// Fills `out` with the noise of token `token` under `seed`.
 pub fn normal(seed: u64, token: u64, out: &mut [f32]) {
@@ -16,7 +16,8 @@ pub fn normal(seed: u64, token: u64, out: &mut [f32]) {
     }
 }
 
-/// Two independent numbers in [0, 1) of index `index` under `seed`; no noise of a token comes from the same counter.
+/// Two independent numbers in [0, 1) of index `index` under `seed`; no noise of a token comes from
+/// the same counter.
 pub fn uniform(seed: u64, index: u64) -> [f32; 2] {
     let bits = philox([index as u32, (index >> 32) as u32, 0, 1], [seed as u32, (seed >> 32) as u32]);
     [bits[0], bits[1]].map(|b| (b >> 8) as f32 / (1 << 24) as f32)
@@ -32,7 +33,8 @@ fn philox(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     counter
 }
 
-/// Two independent normals from two words; the first word is mapped to (0, 1], so the logarithm is finite.
+/// Two independent normals from two words; the first word is mapped to (0, 1], so the logarithm is
+/// finite.
 fn box_muller(a: u32, b: u32) -> (f32, f32) {
     const STEP: f64 = 1.0 / 4_294_967_296.0;
     let radius = libm::sqrt(-2.0 * libm::log((f64::from(a) + 1.0) * STEP));

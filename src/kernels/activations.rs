@@ -2,16 +2,18 @@
 
 use std::collections::BTreeMap;
 
-/// Calls of a layer of which all count for second moments: what turns flow times into modulation runs a few times at the start.
+/// Calls of a layer of which all count for second moments: what turns flow times into modulation
+/// runs a few times at the start.
 const FIRST: usize = 64;
 
 /// Rows of each call that are kept, at most.
 const ROWS: usize = 8;
 
-/// What flows into named linear layers in every `every`-th call: up to `limit` rows of each, or the second moments of all.
+/// What flows into named linear layers in every `every`-th call: up to `limit` rows of each, or the
+/// second moments of all.
 ///
-/// Given to an [`Exec`](super::Exec) it listens to all its linear layers whose matrices have a name. It allocates: a tool, not part of
-/// a running session.
+/// Given to an [`Exec`](super::Exec) it listens to all its linear layers whose matrices have a
+/// name. It allocates: a tool, not part of a running session.
 #[derive(Debug, Clone, Default)]
 pub struct Activations {
     limit: usize,
@@ -29,8 +31,9 @@ struct Layer {
     moments: Vec<f64>,
 }
 
+#[cfg(feature = "internals")]
 impl Activations {
-    /// Keeps at most `limit` rows a layer, from every `every`-th call (1: from each).
+    /// Keeps at most `limit` rows per layer, from every `every`-th call (1: from each).
     pub fn new(limit: usize, every: usize) -> Self {
         Self { limit, every: every.max(1), moments: false, layers: BTreeMap::new() }
     }
@@ -45,8 +48,8 @@ impl Activations {
         self.every = every.max(1);
     }
 
-    /// Sums of the products of inputs i and j of layer `name`, `[inputs, inputs]` of which the upper triangle counts; empty if it was never
-    /// called or rows were kept instead.
+    /// Sums of the products of inputs i and j of layer `name`, `[inputs, inputs]` of which the
+    /// upper triangle counts; empty if it was never called or rows were kept instead.
     pub fn moments(&self, name: &str) -> &[f64] {
         self.layers.get(name).map_or(&[], |layer| &layer.moments)
     }
@@ -60,7 +63,9 @@ impl Activations {
     pub fn rows(&self, name: &str) -> &[f32] {
         self.layers.get(name).map_or(&[], |layer| &layer.rows)
     }
+}
 
+impl Activations {
     pub(super) fn listen(&mut self, name: &str, x: &[f32], cols: usize) {
         if name.is_empty() {
             return;

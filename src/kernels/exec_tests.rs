@@ -1,9 +1,11 @@
-//! `Exec` as networks use it: against plain loops in f64, and the same bits for each level and number of threads.
+//! `Exec` as networks use it: against plain loops in f64, and the same bits for each level and
+//! number of threads.
 
 use half::f16;
 
 use super::testing::{Random, bits, levels};
 use super::*;
+use crate::error::ErrorKind;
 
 struct Case {
     rows: usize,
@@ -151,7 +153,8 @@ fn check(
     }
 }
 
-/// Scales at the ends of what floats hold, rows of zeros among huge and denormal ones, slices that begin anywhere.
+/// Scales at the ends of what floats hold, rows of zeros among huge and denormal ones, slices that
+/// begin anywhere.
 #[test]
 fn extreme_scales_have_the_same_bits_everywhere() {
     let mut random = Random(7);

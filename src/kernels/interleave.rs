@@ -1,4 +1,5 @@
-//! Sixteen rows of bytes to panels, in which a few consecutive columns of each row lie side by side: the inner loops of packing.
+//! Sixteen rows of bytes to panels, in which a few consecutive columns of each row lie side by
+//! side: the inner loops of packing.
 //!
 //! Plain copies of words, two at a time; a panel stays in the first-level cache while it is filled.
 
@@ -11,8 +12,9 @@ const LOW: u64 = u32::MAX as u64;
 /// Columns that are read at once: a cache line of each row.
 const COLS: usize = 64;
 
-/// Columns `0 .. n` of 16 rows of `cols` bytes as lines of 4 columns a row, each pair of words through `map`; returns n, a multiple of 16. The line of
-/// columns `4 i ..` begins at byte `64 i` of `panel`.
+/// Columns `0 .. n` of 16 rows of `cols` bytes as lines of 4 columns per row, each pair of words
+/// through `map`; returns n, a multiple of 16. The line of columns `4 i ..` begins at byte `64 i`
+/// of `panel`.
 #[inline(always)]
 pub(super) fn quads(rows: &[i8], cols: usize, panel: &mut [u8], map: impl Fn(u64) -> u64) -> usize {
     let done = cols / 16 * 16;
@@ -42,8 +44,8 @@ pub(super) fn quads(rows: &[i8], cols: usize, panel: &mut [u8], map: impl Fn(u64
     done
 }
 
-/// Columns `0 .. n` of 16 rows of `cols` bytes as pairs of lines, 8 columns a row; returns n, a multiple of 16. The lines of columns `8 i ..` begin at byte
-/// `128 i` of `panel`.
+/// Columns `0 .. n` of 16 rows of `cols` bytes as pairs of lines, 8 columns per row; returns n, a
+/// multiple of 16. The lines of columns `8 i ..` begin at byte `128 i` of `panel`.
 pub(super) fn octets(rows: &[i8], cols: usize, panel: &mut [u8]) -> usize {
     let done = cols / 16 * 16;
     for from in (0..done).step_by(COLS) {

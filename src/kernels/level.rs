@@ -1,4 +1,4 @@
-//! CPU levels: what they are, which are available, and `VISAVIS_CPU`.
+//! CPU levels: what they are, what each is compiled for, which are available, and `VISAVIS_CPU`.
 
 use std::fmt;
 
@@ -6,7 +6,8 @@ use crate::error::{Error, ErrorKind, Result};
 
 /// An instruction set that kernels are written for.
 ///
-/// Every operation has a scalar variant; a level uses, for each operation, the best variant it [includes](Self::includes).
+/// Every operation has a scalar variant; a level uses, for each operation, the best variant that it
+/// [includes](Self::includes).
 #[non_exhaustive]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Level {
@@ -16,7 +17,8 @@ pub enum Level {
     Neon,
     /// [`Neon`](Self::Neon) and `sdot`: int8 dot products (Cortex-A55, A76 and later).
     Dotprod,
-    /// [`Dotprod`](Self::Dotprod) and `smmla`: int8 matrix products (ARMv8.6: Cortex-X2, A510, A710 and later).
+    /// [`Dotprod`](Self::Dotprod) and `smmla`: int8 matrix products (ARMv8.6: Cortex-X2, A510, A710
+    /// and later).
     I8mm,
     /// x86-64 with AVX2, FMA and F16C (Haswell, Zen and later).
     Avx2,
@@ -24,6 +26,63 @@ pub enum Level {
     AvxVnni,
     /// AVX-512 F, BW, DQ, VL and VNNI (Ice Lake, Zen 4 and later).
     Avx512,
+}
+
+/// Architecture and features of a level, handed to the macro `$then` with `$args`: the one list
+/// that detection, tokens and variants are made from, so that what is compiled is what is looked
+/// for.
+macro_rules! features {
+    (Scalar, [$($then:tt)+] $args:tt) => { $($then)+! { any [] $args } };
+    (Neon, [$($then:tt)+] $args:tt) => { $($then)+! { "aarch64" ["neon"] $args } };
+    (Dotprod, [$($then:tt)+] $args:tt) => { $($then)+! { "aarch64" ["neon", "dotprod"] $args } };
+    (I8mm, [$($then:tt)+] $args:tt) => { $($then)+! { "aarch64" ["neon", "dotprod", "i8mm"] $args } };
+    (Avx2, [$($then:tt)+] $args:tt) => { $($then)+! { "x86_64" ["avx2", "fma", "f16c"] $args } };
+    (AvxVnni, [$($then:tt)+] $args:tt) => { $($then)+! { "x86_64" ["avx2", "fma", "f16c", "avxvnni"] $args } };
+    (Avx512, [$($then:tt)+] $args:tt) => {
+        $($then)+! {
+            "x86_64"
+            ["avx2", "fma", "f16c", "avx512f", "avx512bw", "avx512dq", "avx512vl", "avx512vnni"]
+            $args
+        }
+    };
+}
+pub(crate) use features;
+
+/// The names of a level's features.
+macro_rules! list {
+    ($arch:tt [$($feature:tt),*] ()) => { &[$($feature),*] };
+}
+
+/// Whether this CPU has a level's features.
+macro_rules! detected {
+    (any [] ()) => { true };
+    ("x86_64" [$($feature:tt),*] ()) => {{
+        #[cfg(target_arch = "x86_64")]
+        { $(std::arch::is_x86_feature_detected!($feature))&&* }
+        #[cfg(not(target_arch = "x86_64"))]
+        { false }
+    }};
+    ("aarch64" [$($feature:tt),*] ()) => {{
+        #[cfg(target_arch = "aarch64")]
+        { $(std::arch::is_aarch64_feature_detected!($feature))&&* }
+        #[cfg(not(target_arch = "aarch64"))]
+        { false }
+    }};
+}
+
+/// Evaluates [`features`] with the level that `$level` is.
+macro_rules! each_level {
+    ($level:expr, $then:ident) => {
+        match $level {
+            Level::Scalar => features!(Scalar, [$then]()),
+            Level::Neon => features!(Neon, [$then]()),
+            Level::Dotprod => features!(Dotprod, [$then]()),
+            Level::I8mm => features!(I8mm, [$then]()),
+            Level::Avx2 => features!(Avx2, [$then]()),
+            Level::AvxVnni => features!(AvxVnni, [$then]()),
+            Level::Avx512 => features!(Avx512, [$then]()),
+        }
+    };
 }
 
 impl Level {
@@ -49,48 +108,18 @@ impl Level {
         Self::ALL.into_iter().find(|l| l.name() == name)
     }
 
+    fn features(self) -> &'static [&'static str] {
+        each_level!(self, list)
+    }
+
     /// Whether a CPU of this level can run kernels written for `other`.
     pub fn includes(self, other: Level) -> bool {
-        use Level::{Avx2, Avx512, AvxVnni, Dotprod, I8mm, Neon, Scalar};
-        self == other
-            || other == Scalar
-            || matches!((self, other), (Dotprod, Neon) | (I8mm, Neon | Dotprod) | (AvxVnni | Avx512, Avx2))
+        other.features().iter().all(|feature| self.features().contains(feature))
     }
 
     /// Whether this CPU can run it.
     pub fn is_available(self) -> bool {
-        if self == Self::Scalar {
-            return true;
-        }
-        #[cfg(target_arch = "x86_64")]
-        {
-            use std::arch::is_x86_feature_detected as has;
-            let avx2 = has!("avx2") && has!("fma") && has!("f16c");
-            match self {
-                Self::Avx2 => avx2,
-                Self::AvxVnni => avx2 && has!("avxvnni"),
-                Self::Avx512 => {
-                    avx2 && has!("avx512f")
-                        && has!("avx512bw")
-                        && has!("avx512dq")
-                        && has!("avx512vl")
-                        && has!("avx512vnni")
-                }
-                _ => false,
-            }
-        }
-        #[cfg(target_arch = "aarch64")]
-        {
-            use std::arch::is_aarch64_feature_detected as has;
-            match self {
-                Self::Neon => has!("neon"),
-                Self::Dotprod => has!("neon") && has!("dotprod"),
-                Self::I8mm => has!("neon") && has!("dotprod") && has!("i8mm"),
-                _ => false,
-            }
-        }
-        #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-        false
+        each_level!(self, detected)
     }
 
     /// The levels that this CPU can run, weakest first; never empty.
@@ -99,24 +128,23 @@ impl Level {
     }
 
     /// The level to use: what `forced` names (the value of `VISAVIS_CPU`), else the best available.
-    pub(crate) fn choose(forced: Option<&str>) -> Result<Level> {
-        let available = Self::available();
-        let list = || available.iter().map(|l| l.name()).collect::<Vec<_>>().join(", ");
+    pub(crate) fn choose(forced: Option<&str>) -> Result<Available> {
         let Some(name) = forced.map(str::trim).filter(|n| !n.is_empty()) else {
-            return Ok(available.last().copied().unwrap_or(Self::Scalar));
+            return Ok(Available(Self::available().last().copied().unwrap_or(Self::Scalar)));
         };
-        match Self::from_name(name) {
-            Some(level) if level.is_available() => Ok(level),
-            Some(_) => Err(Error::new(
-                ErrorKind::CpuLevel,
-                format!("VISAVIS_CPU={name}: this CPU cannot run that level; available here: {}", list()),
-            )),
-            None => Err(Error::new(
-                ErrorKind::CpuLevel,
-                format!("VISAVIS_CPU={name}: no such level; available here: {}", list()),
-            )),
-        }
+        let reason = match Self::from_name(name).map(Available::new) {
+            Some(Some(available)) => return Ok(available),
+            Some(None) => "this CPU cannot run that level",
+            None => "no such level",
+        };
+        Err(missing(&format!("VISAVIS_CPU={name}: {reason}")))
     }
+}
+
+/// The error of a level that cannot be used, with those that can.
+pub(super) fn missing(reason: &str) -> Error {
+    let list = Level::available().iter().map(|l| l.name()).collect::<Vec<_>>().join(", ");
+    Error::new(ErrorKind::CpuLevel, format!("{reason}; available here: {list}"))
 }
 
 impl fmt::Display for Level {
@@ -124,6 +152,74 @@ impl fmt::Display for Level {
         f.write_str(self.name())
     }
 }
+
+/// A level that this CPU was found to have: the proof that a [`Kernel`](super::operation::Kernel)
+/// rests on, which only this file can make.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Available(Level);
+
+impl Available {
+    /// `level`, if this CPU can run it.
+    pub(crate) fn new(level: Level) -> Option<Self> {
+        level.is_available().then_some(Self(level))
+    }
+
+    pub(crate) fn level(self) -> Level {
+        self.0
+    }
+}
+
+/// Proofs by the compiler: a token is made where code is compiled for its level, and nowhere else.
+pub(crate) mod token {
+    macro_rules! token {
+        ($arch:tt [$($feature:tt),*] ($level:ident)) => {
+            /// Proof that the CPU that runs this has the level of this name.
+            #[cfg(target_arch = $arch)]
+            #[derive(Clone, Copy)]
+            pub(crate) struct $level(());
+
+            #[cfg(target_arch = $arch)]
+            impl $level {
+                /// Safe to call in functions that are compiled for the level alone.
+                #[inline]
+                #[target_feature($(enable = $feature),*)]
+                pub(crate) fn here() -> Self {
+                    Self(())
+                }
+            }
+        };
+    }
+
+    features!(Neon, [token](Neon));
+    features!(Avx2, [token](Avx2));
+    features!(Avx512, [token](Avx512));
+}
+
+/// Methods of a token, compiled for its level: `for LEVEL: fn name(self, ...) { ... }`. Their
+/// bodies call the level's intrinsics, and functions compiled for it, without `unsafe`.
+macro_rules! compiled {
+    (for $level:ident: $($functions:tt)*) => { $crate::kernels::level::features!($level, [$crate::kernels::level::compile] ($level $($functions)*)); };
+}
+macro_rules! compile {
+    ($arch:tt $features:tt
+     ($level:ident $(fn $name:ident(self $(, $arg:ident: $type:ty)*) $(-> $result:ty)? $body:block)*)) => {
+        $($crate::kernels::level::compile! { @one $features $level fn $name ($($arg: $type),*) ($($result)?) $body })*
+    };
+    (@one [$($feature:tt),*] $level:ident fn $name:ident ($($arg:ident: $type:ty),*) ($($result:ty)?) $body:block) => {
+        #[inline(always)]
+        fn $name(self $(, $arg: $type)*) $(-> $result)? {
+            #[inline]
+            #[target_feature($(enable = $feature),*)]
+            fn compiled($($arg: $type),*) $(-> $result)? $body
+            let _: $crate::kernels::level::token::$level = self;
+            // SAFETY: `self` is a token of the level, whose features these are, so the CPU has
+            // them.
+            unsafe { compiled($($arg),*) }
+        }
+    };
+}
+#[allow(unused_imports, reason = "an architecture without vectors of 16 floats uses neither")]
+pub(crate) use {compile, compiled};
 
 #[cfg(test)]
 mod tests {
@@ -138,6 +234,16 @@ mod tests {
     }
 
     #[test]
+    fn levels_include_those_they_are_built_on() {
+        use Level::{Avx2, Avx512, AvxVnni, Dotprod, I8mm, Neon};
+        let included = [(Dotprod, Neon), (I8mm, Neon), (I8mm, Dotprod), (AvxVnni, Avx2), (Avx512, Avx2)];
+        for (a, b) in Level::ALL.into_iter().flat_map(|a| Level::ALL.map(|b| (a, b))) {
+            let expected = a == b || b == Level::Scalar || included.contains(&(a, b));
+            assert_eq!(a.includes(b), expected, "{a} and {b}");
+        }
+    }
+
+    #[test]
     fn a_level_that_is_missing_is_a_typed_error_that_lists_the_others() {
         let missing = Level::ALL.into_iter().find(|l| !l.is_available()).expect("no CPU has all architectures");
         for name in [missing.name(), "mmx"] {
@@ -145,7 +251,8 @@ mod tests {
             assert_eq!(e.kind(), ErrorKind::CpuLevel);
             assert!(e.to_string().contains(name) && e.to_string().contains("scalar"), "{e}");
         }
-        assert_eq!(Level::choose(Some("scalar")).unwrap(), Level::Scalar);
-        assert_eq!(Level::choose(Some(" ")).unwrap(), Level::choose(None).unwrap());
+        let chosen = |forced| Level::choose(forced).unwrap().level();
+        assert_eq!(chosen(Some("scalar")), Level::Scalar);
+        assert_eq!(chosen(Some(" ")), chosen(None));
     }
 }

@@ -1,7 +1,8 @@
 //! Elementary functions and reductions that every level computes with the same bits.
 //!
-//! Written on scalars and 16-lane arrays without branches, and inlined into functions that are compiled for one level
-//! each, where the compiler turns the lanes into vectors. Only IEEE operations and fused multiply-adds are used.
+//! Written on scalars and 16-lane arrays without branches, and inlined into functions that are
+//! compiled for one level each, where the compiler turns the lanes into vectors. Only IEEE
+//! operations and fused multiply-adds are used.
 
 /// Lanes of every reduction.
 pub(crate) const LANES: usize = 16;
@@ -20,14 +21,17 @@ pub(crate) fn fold(mut v: Lanes) -> f32 {
     v[0]
 }
 
-/// Rounds to nearest even by its own rounding error: for |x| < 2^22, x + MAGIC holds the integer in its low bits.
+/// Rounds to nearest even by its own rounding error: for |x| < 2^22, x + MAGIC holds the integer in
+/// its low bits.
 const MAGIC: f32 = 12_582_912.0;
 const LN2_HI: f32 = 0.693_359_4;
 const LN2_LO: f32 = -2.121_944_4e-4;
 
-/// e^x with relative error below 2e-7 for x in [-87, 88]; clamped outside to e^-87 and e^88; NaN stays NaN.
+/// e^x with relative error below 2e-7 for x in [-87, 88]; clamped outside to e^-87 and e^88; NaN
+/// stays NaN.
 ///
-/// x = n ln 2 + r with |r| <= ln 2 / 2, and the Taylor polynomial of degree 7 in r, whose remainder is below 6e-9.
+/// x = n ln 2 + r with |r| <= ln 2 / 2, and the Taylor polynomial of degree 7 in r, whose remainder
+/// is below 6e-9.
 #[inline(always)]
 pub(crate) fn exp(x: f32) -> f32 {
     let x = if x < -87.0 { -87.0 } else { x };
@@ -48,7 +52,8 @@ pub(crate) fn silu(x: f32) -> f32 {
     x / (1.0 + exp(-x))
 }
 
-/// GELU in its tanh form, 0.5 x (1 + tanh(sqrt(2/pi) (x + 0.044715 x^3))), as x / (1 + e^(-2u)) with u the argument of tanh.
+/// GELU in its tanh form, 0.5 x (1 + tanh(sqrt(2/pi) (x + 0.044715 x^3))), as x / (1 + e^(-2u))
+/// with u the argument of tanh.
 #[inline(always)]
 pub(crate) fn gelu(x: f32) -> f32 {
     const A: f32 = -2.0 * 0.797_884_6; // sqrt(2/pi)

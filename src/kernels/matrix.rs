@@ -2,9 +2,14 @@
 
 use half::f16;
 
-use super::packed::{Buffer, FloatGeometry, MAX_PANELS, NR, Onward, TILE_COLS};
+use super::Kernels;
+use super::matmul_f32_f16::MatmulF32F16;
+use super::matmul_f32_f32::MatmulF32F32;
+use super::matmul_i8dx_i4g::{self, MatmulI8I4};
+use super::matmul_i8dx_i8cx::{self, MatmulI8I8};
+use super::operation::{Kernel, Operation};
+use super::packed::{Buffer, FloatGeometry, MAX_PANELS, NR, PrefetchTarget, TILE_COLS};
 use super::weights::{WeightData, Weights};
-use super::{Kernels, Variant, matmul_f32_f16, matmul_f32_f32, matmul_i8dx_i4g, matmul_i8dx_i8cx};
 use crate::scheme::Scheme;
 
 /// A linear layer packed for one CPU level: weights, scales and bias.
@@ -20,12 +25,19 @@ pub struct Matrix {
     pub(super) split: bool,
 }
 
-/// Packed weights with the variant they are packed for; the variant came from a [`Kernels`], hence runs on this CPU.
+/// Packed weights, where each lies, and the kernel that they are packed for.
+pub(super) struct Packed<O: Operation, G> {
+    pub(super) buffer: Buffer,
+    pub(super) geo: G,
+    pub(super) kernel: Kernel<O>,
+}
+
 pub(super) enum Body {
-    F32(Buffer, FloatGeometry, &'static Variant<matmul_f32_f32::Run>),
-    F16(Buffer, FloatGeometry, &'static Variant<matmul_f32_f16::Run>),
-    I8(Buffer, matmul_i8dx_i8cx::Geometry, Vec<f32>, &'static Variant<matmul_i8dx_i8cx::Kernel>),
-    I4(Buffer, matmul_i8dx_i4g::Geometry, &'static Variant<matmul_i8dx_i4g::Run>),
+    F32(Packed<MatmulF32F32, FloatGeometry>),
+    F16(Packed<MatmulF32F16, FloatGeometry>),
+    /// With the scale of each output.
+    I8(Packed<MatmulI8I8, matmul_i8dx_i8cx::Geometry>, Vec<f32>),
+    I4(Packed<MatmulI8I4, matmul_i8dx_i4g::Geometry>),
 }
 
 impl Matrix {
@@ -44,23 +56,24 @@ impl Matrix {
         let body = match data {
             WeightData::F32(w) => {
                 let geo = FloatGeometry::new(cols, 4);
-                Body::F32(pack_floats(w, rows, cols, &geo, panels), geo, kernels.f32)
+                Body::F32(Packed { buffer: pack_floats(w, rows, cols, &geo, panels), geo, kernel: kernels.f32 })
             }
             WeightData::F16(w) => {
                 let geo = FloatGeometry::new(cols, 2);
-                Body::F16(pack_floats(w, rows, cols, &geo, panels), geo, kernels.f16)
+                Body::F16(Packed { buffer: pack_floats(w, rows, cols, &geo, panels), geo, kernel: kernels.f16 })
             }
             WeightData::I8 { q, scale } => {
                 assert_eq!(q.len(), rows * cols, "pack: rows * cols values");
-                let geo = matmul_i8dx_i8cx::Geometry::new(cols, kernels.i8.run.layout);
+                let geo = matmul_i8dx_i8cx::Geometry::new(cols, *kernels.i8.about());
                 let mut buffer = Buffer::new(panels * geo.panel);
                 each_panel(buffer.of_mut::<u8>(), geo.panel, |p, panel| {
                     geo.pack(&q[p * NR * cols..rows.min((p + 1) * NR) * cols], cols, panel);
                 });
-                Body::I8(buffer, geo, pad(scale), kernels.i8)
+                Body::I8(Packed { buffer, geo, kernel: kernels.i8 }, pad(scale))
             }
             WeightData::I4 { q, scale } => {
-                Body::I4(pack_nibbles(q, scale, rows, cols, panels), matmul_i8dx_i4g::Geometry::new(cols), kernels.i4)
+                let geo = matmul_i8dx_i4g::Geometry::new(cols);
+                Body::I4(Packed { buffer: pack_nibbles(q, scale, rows, cols, &geo, panels), geo, kernel: kernels.i4 })
             }
         };
         Matrix { name: String::new(), out: rows, cols, bias, body, split: false }
@@ -73,8 +86,9 @@ impl Matrix {
         self
     }
 
-    /// The same matrix for int16 activations instead of int8 (W8A16, W4A16), where its weights are integers: twice the multiplications, the
-    /// same bytes, 1/254 of the activations' rounding. Float weights take floats as they come either way.
+    /// The same matrix for int16 activations instead of int8 (W8A16, W4A16), where its weights are
+    /// integers: twice the multiplications, the same bytes, 1/254 of the activations' rounding.
+    /// Float weights take floats as they come either way.
     #[must_use]
     pub fn with_int16_activations(mut self) -> Self {
         self.split = matches!(self.body, Body::I8(..) | Body::I4(..));
@@ -103,20 +117,23 @@ impl Matrix {
     pub fn bytes(&self) -> usize {
         4 * self.bias.len()
             + match &self.body {
-                Body::F32(b, ..) | Body::F16(b, ..) | Body::I4(b, ..) => b.bytes(),
-                Body::I8(b, _, scale, _) => b.bytes() + 4 * scale.len(),
+                Body::F32(w) => w.buffer.bytes(),
+                Body::F16(w) => w.buffer.bytes(),
+                Body::I8(w, scale) => w.buffer.bytes() + 4 * scale.len(),
+                Body::I4(w) => w.buffer.bytes(),
             }
     }
 
-    /// Where the threads begin to read integer weights: one at the first tile, the other at the last.
-    pub(super) fn ends(&self) -> Option<[Onward; 2]> {
+    /// Where the threads begin to read integer weights: one at the first tile, the other at the
+    /// last.
+    pub(super) fn ends(&self) -> Option<[PrefetchTarget; 2]> {
         let (weights, panel) = match &self.body {
             Body::F32(..) | Body::F16(..) => return None,
-            Body::I8(buffer, geo, ..) => (buffer.of::<u8>(), geo.panel),
-            Body::I4(buffer, geo, _) => (buffer.of::<u8>(), geo.panel),
+            Body::I8(w, _) => (w.buffer.of::<u8>(), w.geo.panel),
+            Body::I4(w) => (w.buffer.of::<u8>(), w.geo.panel),
         };
         let last = (self.out - 1) / TILE_COLS * MAX_PANELS * panel;
-        Some([0, last].map(|at| Onward::new(weights, at, panel)))
+        Some([0, last].map(|at| PrefetchTarget::new(weights, at, panel)))
     }
 
     /// Scheme of the weights.
@@ -136,8 +153,8 @@ impl std::fmt::Debug for Matrix {
     }
 }
 
-/// Calls `pack` with the number and the memory of each panel of `size` values. One thread does it: nobody has said how many there may be when an
-/// engine is made, and memory is the limit.
+/// Calls `pack` with the number and the memory of each panel of `size` values. One thread does it:
+/// nobody has said how many there may be when an engine is made, and memory is the limit.
 fn each_panel<T>(values: &mut [T], size: usize, pack: impl Fn(usize, &mut [T])) {
     values.chunks_exact_mut(size).enumerate().for_each(|(p, panel)| pack(p, panel));
 }
@@ -161,8 +178,14 @@ fn pack_floats<T: super::packed::Plain>(
     buffer
 }
 
-fn pack_nibbles(q: &[u8], scale: &[f16], rows: usize, cols: usize, panels: usize) -> Buffer {
-    let geo = matmul_i8dx_i4g::Geometry::new(cols);
+fn pack_nibbles(
+    q: &[u8],
+    scale: &[f16],
+    rows: usize,
+    cols: usize,
+    geo: &matmul_i8dx_i4g::Geometry,
+    panels: usize,
+) -> Buffer {
     let stride = cols.div_ceil(2);
     assert_eq!(q.len(), rows * stride, "pack: rows * ceil(cols / 2) bytes");
     assert_eq!(scale.len(), rows * geo.groups, "pack: rows * ceil(cols / 32) scales");

@@ -1,49 +1,79 @@
-//! Arithmetic of the networks: skinny matrix products, attention, normalisation, activations, polar factors.
+//! Arithmetic of the networks: skinny matrix products, attention, normalisation, activations, polar
+//! factors.
 //!
-//! One folder an operation, each of the same make:
+//! One folder per operation, each of the same make:
 //!
 //! | file | holds |
 //! |---|---|
-//! | `mod.rs` | the contract: the formula, the shapes, what slices must hold, how packed data lies; and `VARIANTS`, the one table of variants |
+//! | `mod.rs` | the contract: formula, shapes, packed layout; its declaration, `operation!` |
 //! | `scalar.rs` | the reference: plain Rust that defines every bit of the result |
-//! | `avx2.rs`, `neon.rs`, ... | one variant each, named after the level that it needs |
-//! | `tests.rs` | every entry of the table that this CPU can run against the reference, with random shapes, tails, unaligned slices and extremes; then what the reference itself must do |
+//! | `simd.rs` | the operation on any level that has [`f32x16`] |
+//! | `avx2.rs`, `i8mm.rs`, ... | one hand-written variant each, named after its level |
+//! | `tests.rs` | `cases` for all variants: random shapes, tails, extremes; what the reference must do |
 //!
-//! | operation | computes | for |
-//! |---|---|---|
-//! | `matmul_f32_f32`, `matmul_f32_f16` | x W', float weights | bundles of floats, and layers that are kept so |
-//! | `matmul_i8dx_i8cx` | the same of int8 rows (`i8dx`: quantised per row as they come) and int8 weights (`i8cx`: a scale a channel) | nearly all weights of int8 bundles |
-//! | `matmul_i8dx_i4g` | the same with int4 weights, a scale for a group of 32 columns | nearly all weights of int4 bundles |
-//! | `quantize_rows` | rows of activations to int8 | both of those |
-//! | `split_rows` | rows of activations to int16, as two rows of int8 | both, for layers whose activations int8 is too coarse for |
-//! | `epilogue` | what follows a product: scales, bias, then store, GELU, or addition to the residual stream, gated or not | every product |
-//! | `norm` | layer normalisation with AdaLN's shift and scale | flow, autoencoder |
-//! | `rope` | rotary positions | queries and keys |
-//! | `attend` | attention over rings of cached keys and values, softmax included; rows of one ring read them together | flow, autoencoder |
-//! | `gelu` | GELU and SiLU by themselves | embedding of the flow time |
-//! | `fold` (one file) | a product of float matrices in f64 | two layers that become one when a bundle is loaded |
-//! | `polar` | nearest rotations of 3x3 matrices | all joints of a frame |
+//! | operation | computes |
+//! |---|---|
+//! | `matmul_f32_f32`, `matmul_f32_f16` | x W', float weights |
+//! | `matmul_i8dx_i8cx` | x W' of int8 rows, scaled per row, and int8 weights, scaled per channel |
+//! | `matmul_i8dx_i4g` | x W' of int8 rows and weights of int4, one scale per group of 32 columns |
+//! | `quantize_rows` | rows of activations to int8 |
+//! | `split_rows` | rows to int16, as two rows of int8 each, where int8 is too coarse |
+//! | `epilogue` | what follows a product: scales, bias, then store, GELU or (gated) addition |
+//! | `norm` | layer normalisation with AdaLN's shift and scale |
+//! | `rope` | rotary positions of queries and keys |
+//! | `attend` | attention over rings of cached keys and values, softmax included |
+//! | `gelu` | GELU and SiLU by themselves |
+//! | `fold` (one file) | a product in f64: two layers become one when a bundle is loaded |
+//! | `polar` | nearest rotations of 3x3 matrices: all joints of a frame |
 //!
-//! To read one, open `matmul_i8dx_i8cx/mod.rs`, then its `scalar.rs`, one variant, `tests.rs`; the others follow. `cargo test --lib kernels::OPERATION` tests one,
-//! `cargo bench --bench kernels` times all. From a layer to its kernel: [`Kernels::detect`] picks an entry of each table,
-//! [`Kernels::pack`] lays a layer's weights out for it (a [`Matrix`]), and [`Exec::linear`] cuts a product into tiles of 64 outputs, which threads take:
-//! sums by the product's variant, then the epilogue while the tile is in the first-level cache. A new variant is a file with a function of
-//! the table's type and a line in the table; no list of tests is to be kept, because tests iterate the tables, so none can be listed untested.
+//! To read one, open `matmul_i8dx_i8cx/mod.rs`, then its `scalar.rs`, one variant, `tests.rs`; the
+//! others follow. `cargo test --lib kernels::OPERATION` tests one, `cargo bench --bench kernels`
+//! times all.
 //!
-//! **Same bits everywhere.** Every variant of every operation gives the bits of the scalar reference: integer sums are
-//! exact, and each float operation fixes its order of summation (16 lanes, folded by halves) and where it uses a fused
-//! multiply-add (correctly rounded on every CPU, in software at the scalar level). So a session replays bit for bit on
-//! another level, on another architecture, and with another number of threads.
+//! **From a layer to its kernel.** [`Kernels::detect`] picks the best variant of each operation,
+//! [`Kernels::pack`] lays a layer's weights out for it (a [`Matrix`]), and [`Exec::linear`] cuts a
+//! product into tiles of 64 outputs, which threads take (`linear.rs`): sums by the product's
+//! variant, then the epilogue while the tile is in the first-level cache. What a variant covers at
+//! once, so many rows and panels as its registers hold, is said by `for_blocks!` (`packed.rs`).
 //!
-//! **Unsafe.** A variant is an `unsafe fn` for one reason: it may be called only on a CPU that has its level. [`Kernels`] and [`Matrix`] exist only for
-//! levels that were found here, which is what each call's `SAFETY` line says. Inside, variants check their operands (`check`, asserts on lengths) before
-//! the first pointer is made.
+//! **Adding a kernel.** For one more level of an operation, either name the level in the line of
+//! its `operation!` that compiles the scalar body, or the `simd` one; or write a file with a
+//! function `run` under `#[target_feature]` and give it a line of its own. The compiler refuses a
+//! function that asks for more than its level has, and `variants_have_the_bits_of_the_reference`
+//! takes it up without further ado: what is declared is tested, wherever a CPU has the level. For a
+//! new operation, write a folder of that make and name the operation in `kernels!` below.
 //!
-//! Kernels do not allocate, lock, or look at the environment; they take slices whose lengths the callers in this
-//! module have checked, and [`Exec`] owns threads and scratch.
+//! **Adding a CPU.** A level is a variant of [`Level`] with its name, and a line of `features!`
+//! (`level.rs`): its architecture and the features that are both looked for and compiled for. A
+//! level that includes another uses its variants until it has its own, so that is all it takes to
+//! begin. With vectors of floats it gets a [`token`](level::token) and an implementation of
+//! [`F32x16`](f32x16::F32x16), named then in the `simd` lines of the float products and of
+//! attention; with products of int8, a variant of both integer products, and the
+//! [`Layout`](matmul_i8dx_i8cx::Layout) of weights that it reads.
 //!
-//! A level that the CPU lacks is compiled and neither run nor tested there; tests and benches take what is available.
-//! aarch64 levels are tested under emulation (`cortex-a57`: NEON, `cortex-a76`: and dotprod, `max`: and i8mm).
+//! **Same bits everywhere.** Every variant of every operation gives the bits of the scalar
+//! reference: integer sums are exact, and each float operation fixes its order of summation (16
+//! lanes, folded by halves) and where it uses a fused multiply-add (correctly rounded on every CPU,
+//! in software at the scalar level). So a session replays bit for bit on another level, on another
+//! architecture, and with another number of threads.
+//!
+//! **Unsafe.** Code that is compiled for a level may run only where the CPU has it. Two proofs
+//! carry that: an [`Available`] level, which a [`Kernel`] is picked by, and a token, which only
+//! code that is compiled for its level can make. The two calls that rest on them are in the macros
+//! `operation!` and `compiled!`. What else is `unsafe` reads and writes memory behind bounds that
+//! the operation's `check` has asserted, or is an instruction without a stable intrinsic.
+//!
+//! **Words.** A *lane* is one of 16 places side by side in a vector or a panel; a *group* is 32
+//! columns that share a sum or a scale; a *batch*, rows that attend together; a *head*, one of
+//! attention's; a *panel*, 16 outputs of packed weights; a *tile*, the results of up to 16 rows and
+//! 4 panels.
+//!
+//! Kernels do not allocate, lock, or look at the environment; they take slices whose lengths the
+//! callers in this module have checked, and [`Exec`] owns threads and scratch.
+//!
+//! A level that the CPU lacks is compiled and neither run nor tested there; tests and benches take
+//! what is available. aarch64 levels are tested under emulation (`cortex-a57`: NEON, `cortex-a76`:
+//! and dotprod, `max`: and i8mm).
 
 #![allow(clippy::needless_range_loop, reason = "tiles are indexed by row, panel and lane side by side")]
 
@@ -53,10 +83,10 @@ mod epilogue;
 mod exec;
 #[cfg(test)]
 mod exec_tests;
+mod f32x16;
 mod fold;
 mod gelu;
 mod interleave;
-mod lanes;
 mod level;
 mod linear;
 mod math;
@@ -66,57 +96,72 @@ mod matmul_i8dx_i4g;
 mod matmul_i8dx_i8cx;
 mod matrix;
 mod norm;
+mod operation;
 mod packed;
 mod polar;
 mod quantize_rows;
 mod rope;
+mod rows;
 mod split_rows;
 #[cfg(test)]
 mod testing;
 mod weights;
+mod workers;
 
 pub use crate::scheme::Scheme;
 pub use activations::Activations;
 pub use attend::{KvCache, KvDtype, Span};
-pub use exec::{Exec, Limits, RowTable};
+pub use exec::{Exec, Limits};
 pub use level::Level;
 pub use linear::Epilogue;
 pub use matrix::Matrix;
+pub use rows::RowTable;
 pub(crate) use weights::signed;
 pub use weights::{I4_GROUP, WeightData, Weights};
 
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::Result;
+use level::Available;
+use operation::{Kernel, Operation};
 
-/// One implementation of an operation: its name in reports, the level it needs, and what it consists of.
-pub(crate) struct Variant<F: 'static> {
-    pub(crate) name: &'static str,
-    pub(crate) level: Level,
-    pub(crate) run: F,
+/// Declares [`Kernels`]: the kernel of each operation.
+macro_rules! kernels {
+    ($($field:ident: $operation:ty,)+) => {
+        /// A CPU level and the best variant of each operation for it.
+        ///
+        /// A value exists only for a level that this CPU has.
+        #[derive(Clone, Copy)]
+        pub struct Kernels {
+            level: Level,
+            $($field: Kernel<$operation>,)+
+        }
+
+        impl Kernels {
+            fn of(available: Available) -> Kernels {
+                Kernels { level: available.level(), $($field: Kernel::best(available),)+ }
+            }
+
+            /// Operation and level of the variant in use, for reports.
+            pub fn variants(&self) -> Vec<(&'static str, &'static str)> {
+                vec![$((<$operation>::NAME, self.$field.level().name())),+]
+            }
+        }
+    };
 }
 
-/// The best variant that `level` includes; tables list the scalar one first and better ones later.
-fn pick<F>(table: &'static [Variant<F>], level: Level) -> &'static Variant<F> {
-    table.iter().rev().find(|v| level.includes(v.level)).unwrap_or(&table[0])
-}
-
-/// A CPU level and the variant of each operation for it.
-///
-/// A value exists only for a level that this CPU has: it is the proof that calls into its variants rest on.
-#[derive(Clone, Copy)]
-pub struct Kernels {
-    level: Level,
-    f32: &'static Variant<matmul_f32_f32::Run>,
-    f16: &'static Variant<matmul_f32_f16::Run>,
-    i8: &'static Variant<matmul_i8dx_i8cx::Kernel>,
-    i4: &'static Variant<matmul_i8dx_i4g::Run>,
-    quantize: &'static Variant<quantize_rows::Run>,
-    split: &'static Variant<split_rows::Run>,
-    epilogue: &'static Variant<epilogue::Run>,
-    attend: &'static Variant<attend::Kernel>,
-    norm: &'static Variant<norm::Run>,
-    rope: &'static Variant<rope::Run>,
-    gelu: &'static Variant<gelu::Kernel>,
-    polar: &'static Variant<polar::Run>,
+kernels! {
+    f32: matmul_f32_f32::MatmulF32F32,
+    f16: matmul_f32_f16::MatmulF32F16,
+    i8: matmul_i8dx_i8cx::MatmulI8I8,
+    i4: matmul_i8dx_i4g::MatmulI8I4,
+    quantize: quantize_rows::QuantizeRows,
+    split: split_rows::SplitRows,
+    epilogue: epilogue::FinishRow,
+    attend: attend::Attend,
+    norm: norm::Norm,
+    rope: rope::Rope,
+    gelu: gelu::Activate,
+    polar: polar::Polar,
+    fold: fold::Fold,
 }
 
 impl Kernels {
@@ -124,7 +169,8 @@ impl Kernels {
     /// (`scalar`, `neon`, `dotprod`, `i8mm`, `avx2`, `avxvnni`, `avx512`).
     ///
     /// # Errors
-    /// [`ErrorKind::CpuLevel`] when it names a level that does not exist or that this CPU lacks; the message lists those available.
+    /// [`CpuLevel`](crate::error::ErrorKind::CpuLevel) when it names a level that does not exist or
+    /// that this CPU lacks; the message lists those available.
     pub fn detect() -> Result<Kernels> {
         let forced = std::env::var_os("VISAVIS_CPU").map(|v| v.to_string_lossy().into_owned());
         Level::choose(forced.as_deref()).map(Self::of)
@@ -133,32 +179,10 @@ impl Kernels {
     /// The kernels of one level, whatever the environment says.
     ///
     /// # Errors
-    /// [`ErrorKind::CpuLevel`] when this CPU cannot run `level`.
+    /// [`CpuLevel`](crate::error::ErrorKind::CpuLevel) when this CPU cannot run `level`.
     pub fn with_level(level: Level) -> Result<Kernels> {
-        if level.is_available() {
-            return Ok(Self::of(level));
-        }
-        let list = Self::available().iter().map(|l| l.name()).collect::<Vec<_>>().join(", ");
-        Err(Error::new(ErrorKind::CpuLevel, format!("this CPU cannot run level {level}; available here: {list}")))
-    }
-
-    /// Callers have checked that `level` is available.
-    fn of(level: Level) -> Kernels {
-        Kernels {
-            level,
-            f32: pick(matmul_f32_f32::VARIANTS, level),
-            f16: pick(matmul_f32_f16::VARIANTS, level),
-            i8: pick(matmul_i8dx_i8cx::VARIANTS, level),
-            i4: pick(matmul_i8dx_i4g::VARIANTS, level),
-            quantize: pick(quantize_rows::VARIANTS, level),
-            split: pick(split_rows::VARIANTS, level),
-            epilogue: pick(epilogue::VARIANTS, level),
-            attend: pick(attend::VARIANTS, level),
-            norm: pick(norm::VARIANTS, level),
-            rope: pick(rope::VARIANTS, level),
-            gelu: pick(gelu::VARIANTS, level),
-            polar: pick(polar::VARIANTS, level),
-        }
+        let missing = || level::missing(&format!("this CPU cannot run level {level}"));
+        Available::new(level).map(Self::of).ok_or_else(missing)
     }
 
     /// The levels that this CPU can run, weakest first.
@@ -171,42 +195,25 @@ impl Kernels {
         self.level
     }
 
-    /// Operation and variant in use, for reports.
-    pub fn variants(&self) -> Vec<(&'static str, &'static str)> {
-        vec![
-            ("matmul_f32_f32", self.f32.name),
-            ("matmul_f32_f16", self.f16.name),
-            ("matmul_i8dx_i8cx", self.i8.name),
-            ("matmul_i8dx_i4g", self.i4.name),
-            ("quantize_rows", self.quantize.name),
-            ("split_rows", self.split.name),
-            ("epilogue", self.epilogue.name),
-            ("attend", self.attend.name),
-            ("norm", self.norm.name),
-            ("rope", self.rope.name),
-            ("gelu", self.gelu.name),
-            ("polar", self.polar.name),
-        ]
-    }
-
-    /// Packs a linear layer for these kernels; the result is read by an [`Exec`] of any level this CPU has.
+    /// Packs a linear layer for these kernels; the result is read by an [`Exec`] of any level this
+    /// CPU has.
     ///
     /// # Panics
-    /// When lengths disagree: see [`WeightData`] for what each scheme needs, and `bias` has `w.rows` values.
+    /// When lengths disagree: see [`WeightData`] for what each scheme needs, and `bias` has
+    /// `w.rows` values.
     pub fn pack(&self, w: Weights<'_>, bias: Option<&[f32]>) -> Matrix {
         Matrix::pack(self, w, bias)
     }
 
-    /// The nearest rotation (row-major 3x3, determinant +1) of each matrix of `m`: the R that maximises tr(R^T m).
-    /// Exact for any reflection or rank; a matrix of rank 0 or 1 has many nearest rotations and gets one of them,
-    /// a non-finite one gets the identity.
+    /// The nearest rotation (row-major 3x3, determinant +1) of each matrix of `m`: the R that
+    /// maximises tr(R^T m). Exact for any reflection or rank; a matrix of rank 0 or 1 has many
+    /// nearest rotations and gets one of them, a non-finite one gets the identity.
     ///
     /// # Panics
     /// When `m` and `out` differ in length.
     pub fn polar(&self, m: &[[f32; 9]], out: &mut [[f32; 9]]) {
         assert_eq!(m.len(), out.len(), "polar: as many results as matrices");
-        // SAFETY: a `Kernels` exists only for a level that this CPU has.
-        unsafe { (self.polar.run)(m, out) }
+        self.polar.run(m, out);
     }
 }
 

@@ -1,6 +1,7 @@
 //! Packed weights: memory and geometry.
 
 use std::fmt;
+use std::ops::Range;
 
 use memmap2::MmapMut;
 
@@ -15,13 +16,13 @@ pub(crate) const MAX_ROWS: usize = 16;
 
 /// Where a thread probably reads on after a tile: a hint for prefetching, which need not be memory.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Onward {
+pub(crate) struct PrefetchTarget {
     at: usize,
     /// Bytes from one panel to the next.
     panel: usize,
 }
 
-impl Onward {
+impl PrefetchTarget {
     /// At tiles of weights that begin `at`.
     pub(crate) fn new(weights: &[u8], at: usize, panel: usize) -> Self {
         Self { at: weights.as_ptr().addr().wrapping_add(at), panel }
@@ -35,6 +36,25 @@ impl Onward {
     }
 }
 
+/// The panels of weights that one kernel call reads.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Panels {
+    pub(crate) first: usize,
+    /// 1 to 4.
+    pub(crate) count: usize,
+    /// What is read after them.
+    #[allow(dead_code, reason = "some levels prefetch")]
+    pub(crate) next: PrefetchTarget,
+}
+
+impl Panels {
+    /// What every variant relies on: that there are so many panels of `size` values in `len`.
+    pub(crate) fn check(&self, len: usize, size: usize) {
+        assert!((1..=MAX_PANELS).contains(&self.count), "panels 1..=4");
+        assert!(len >= (self.first + self.count) * size, "panels exist");
+    }
+}
+
 /// Rows x columns of results of one kernel call, before bias and epilogue.
 pub(crate) type Tile<T> = [[T; TILE_COLS]; MAX_ROWS];
 
@@ -43,7 +63,8 @@ pub(crate) type Tile<T> = [[T; TILE_COLS]; MAX_ROWS];
 #[derive(Clone, Copy)]
 struct Line([u8; 64]);
 
-/// Page size that large buffers ask the system for: fewer address translations while weights stream by.
+/// Page size that large buffers ask the system for: fewer address translations while weights stream
+/// by.
 const HUGE: usize = 2 << 20;
 
 /// Zeroed, 64-byte aligned memory, viewed as bytes, integers or floats.
@@ -58,7 +79,8 @@ enum Store {
     Pages(MmapMut, usize),
 }
 
-/// Smallest buffer in pages of its own, bytes. Weights that live long do not lie between what loading took and gave back, so an allocator can return that.
+/// Smallest buffer in pages of its own, bytes. Weights that live long do not lie between what
+/// loading took and gave back, so an allocator can return that.
 const OWN_PAGES: usize = 1 << 16;
 
 impl Buffer {
@@ -69,7 +91,8 @@ impl Buffer {
         Self { store, bytes }
     }
 
-    /// Buffers in pages of their own: huge ones, as far as they fill them; the system may decline, which costs speed alone.
+    /// Buffers in pages of their own: huge ones, as far as they fill them; the system may decline,
+    /// which costs speed alone.
     fn pages(bytes: usize) -> Option<Store> {
         // Elsewhere a mapping has nothing over the allocator.
         if bytes < OWN_PAGES || cfg!(not(target_os = "linux")) {
@@ -98,7 +121,8 @@ impl Buffer {
 
     /// The memory as values of `T`.
     pub(crate) fn of<T: Plain>(&self) -> &[T] {
-        // SAFETY: `start` is `bytes` initialised bytes aligned to 64, a multiple of `T`'s alignment, and every bit pattern is a `T`.
+        // SAFETY: `start` is `bytes` initialised bytes aligned to 64, a multiple of `T`'s
+        // alignment, and every bit pattern is a `T`.
         unsafe { std::slice::from_raw_parts(self.start().cast(), self.bytes / size_of::<T>()) }
     }
 
@@ -135,13 +159,15 @@ unsafe impl Plain for f32 {}
 // SAFETY: `half::f16` is a transparent u16.
 unsafe impl Plain for half::f16 {}
 
-/// Segments that a panel of floats is cut into along its columns: they are read side by side, each as a stream of its own.
+/// Segments that a panel of floats is cut into along its columns: they are read side by side, each
+/// as a stream of its own.
 pub(crate) const SEGMENTS: usize = 4;
 
 /// Where a float weight lies: panel p, segment s, column k of the segment, lane l at
 /// `p * panel + s * seg_stride + k * NR + l` elements.
 ///
-/// A sum visits column 0 of each segment, then column 1 of each, and so on, into one accumulator a lane.
+/// A sum visits column 0 of each segment, then column 1 of each, and so on, into one accumulator a
+/// lane.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FloatGeometry {
     /// Columns of a segment; a row of activations is padded with zeros to `SEGMENTS * seg` values.
@@ -153,7 +179,8 @@ pub(crate) struct FloatGeometry {
 impl FloatGeometry {
     pub(crate) fn new(cols: usize, element_bytes: usize) -> Self {
         let seg = cols.div_ceil(SEGMENTS);
-        // An odd number of cache lines between streams keeps them in different sets of the first-level cache.
+        // An odd number of cache lines between streams keeps them in different sets of the
+        // first-level cache.
         let line = 64 / element_bytes;
         let seg_stride = ((seg * NR).div_ceil(line) | 1) * line;
         Self { seg, seg_stride, panel: SEGMENTS * seg_stride }
@@ -172,11 +199,8 @@ impl FloatGeometry {
     }
 }
 
-/// Evaluates `$e` with the constant `$R` the number of rows, one of those listed or 1 to 16.
+/// Evaluates `$e` with the constant `$R` the number of rows, one of those listed.
 macro_rules! for_rows {
-    ($rows:expr, $R:ident => $e:expr) => {
-        for_rows!($rows, $R in [1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16] => $e)
-    };
     ($rows:expr, $R:ident in [$($n:literal)*] => $e:expr) => {
         match $rows {
             $($n => { const $R: usize = $n; $e })*
@@ -184,7 +208,48 @@ macro_rules! for_rows {
         }
     };
 }
-pub(crate) use for_rows;
+
+/// Covers the range `$rows` and the first `$panels` panels with blocks of R rows and P panels:
+/// evaluates `$block` for each, with the constants `$R` and `$P` and the first row `$r` and panel
+/// `$p`.
+///
+/// Rows go in even [portions] of at most the largest R listed; as many panels at once, of the
+/// numbers listed from the largest down to 1, as R P accumulators fit `$room`. All rows of some
+/// panels come before the next panels.
+macro_rules! for_blocks {
+    ($rows:expr, $panels:expr, $room:expr, $R:ident in [$($n:literal)*], $P:ident in [$($m:literal)*],
+     |$r:ident, $p:ident| $block:expr) => {{
+        let (rows, panels): (std::ops::Range<usize>, usize) = ($rows, $panels);
+        let most = [$($n),*].into_iter().fold(1, usize::max).min($room);
+        let tallest = rows.len().min(most);
+        let mut $p = 0;
+        while $p < panels {
+            let wide = [$($m),*].into_iter().find(|m| m * tallest <= $room && $p + m <= panels).unwrap_or(1);
+            for portion in $crate::kernels::packed::portions(rows.clone(), most) {
+                let $r = portion.start;
+                $crate::kernels::packed::for_rows!(portion.len(), $R in [$($n)*] => match wide {
+                    $($m => {
+                        const $P: usize = $m;
+                        if $R * $P <= $room {
+                            $block
+                        }
+                    })*
+                    _ => unreachable!("one of those listed"),
+                });
+            }
+            $p += wide;
+        }
+    }};
+}
+pub(crate) use {for_blocks, for_rows};
+
+/// `rows` in as few parts of at most `most` rows as will do, as equal as they can be; the first is
+/// the largest.
+#[inline(always)]
+pub(crate) fn portions(rows: Range<usize>, most: usize) -> impl Iterator<Item = Range<usize>> {
+    let portion = rows.len().div_ceil(rows.len().div_ceil(most).max(1)).max(1);
+    rows.clone().step_by(portion).map(move |from| from..rows.end.min(from + portion))
+}
 
 #[cfg(test)]
 mod tests {
@@ -202,6 +267,25 @@ mod tests {
                 assert_eq!(buffer.of::<u8>()[buffer.bytes() - 1], 255);
             }
         }
+    }
+
+    #[test]
+    fn blocks_cover_every_row_of_every_panel_once() {
+        for (rows, panels) in (0..=16).flat_map(|rows| (1..=MAX_PANELS).map(move |panels| (rows, panels))) {
+            for room in [1, 3, 6, 16, 24] {
+                let mut seen = [[0; MAX_PANELS]; MAX_ROWS];
+                let mut block = |r: usize, p: usize, rows: usize, panels: usize| {
+                    seen[r..r + rows].iter_mut().for_each(|row| row[p..p + panels].iter_mut().for_each(|n| *n += 1));
+                };
+                for_blocks!(0..rows, panels, room, R in [1 2 3 4 5 6], P in [4 2 1], |r, p| block(r, p, R, P));
+                let once = |row: &[i32; MAX_PANELS]| row[..panels].iter().all(|&n| n == 1);
+                assert!(seen[..rows].iter().all(once), "{rows} x {panels}, room {room}: {seen:?}");
+                let total = seen.as_flattened().iter().sum::<i32>();
+                assert_eq!(total as usize, rows * panels, "nothing else: {seen:?}");
+            }
+        }
+        let sizes = |rows: usize, most| portions(3..3 + rows, most).map(|p| p.len()).collect::<Vec<_>>();
+        assert_eq!((sizes(16, 6), sizes(7, 6), sizes(5, 8)), (vec![6, 6, 4], vec![4, 3], vec![5]));
     }
 
     #[test]

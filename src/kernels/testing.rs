@@ -1,6 +1,11 @@
-//! What the operations' tests share: random numbers, awkward values, and the variants that this CPU can run.
+//! What the operations' tests share: random numbers, awkward values, and the variants that this CPU
+//! can run.
 
-use super::{Kernels, Variant};
+use std::fmt::Display;
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use super::operation::{Kernel, Operation};
+use super::{Kernels, Level};
 
 /// SplitMix64 (Steele, Lea and Flood 2014): small, seeded, good enough for test data.
 pub(crate) struct Random(pub(crate) u64);
@@ -39,10 +44,39 @@ impl Random {
     }
 }
 
-/// The entries of a table that this CPU can run, the scalar reference among them.
-pub(crate) fn available<F>(table: &'static [Variant<F>]) -> impl Iterator<Item = &'static Variant<F>> {
-    assert_eq!(table[0].name, "scalar", "the reference comes first");
-    table.iter().filter(|v| v.level.is_available())
+/// Results of one variant, case by case: kept of the scalar one, compared of the others.
+pub(crate) struct Results {
+    level: Level,
+    expected: Vec<u64>,
+    cases: usize,
+}
+
+impl Results {
+    /// The results of one case, as bits; `case` describes it.
+    pub(crate) fn add(&mut self, case: impl Display, bits: impl IntoIterator<Item = u32>) {
+        let mut hasher = DefaultHasher::new();
+        bits.into_iter().for_each(|bits| bits.hash(&mut hasher));
+        if self.level == Level::Scalar {
+            self.expected.push(hasher.finish());
+        } else {
+            let expected = self.expected.get(self.cases).copied();
+            assert_eq!(expected, Some(hasher.finish()), "{} has other bits than the reference: {case}", self.level);
+        }
+        self.cases += 1;
+    }
+}
+
+/// That every variant that this CPU can run has the bits of the scalar one in `cases`, which runs
+/// the kernel that it is given and records what comes out, the same cases for each.
+pub(crate) fn agree<O: Operation>(cases: impl Fn(Kernel<O>, &mut Results)) {
+    let mut results = Results { level: Level::Scalar, expected: Vec::new(), cases: 0 };
+    cases(Kernel::reference(), &mut results);
+    assert!(results.cases > 0, "there are cases");
+    for kernel in Kernel::<O>::all().filter(|k| k.level() != Level::Scalar) {
+        (results.level, results.cases) = (kernel.level(), 0);
+        cases(kernel, &mut results);
+        assert_eq!(results.cases, results.expected.len(), "{}: the same cases for each variant", kernel.level());
+    }
 }
 
 /// Kernels of each available level.
@@ -54,8 +88,9 @@ pub(crate) fn bits(v: &[f32]) -> Vec<u32> {
     v.iter().map(|v| v.to_bits()).collect()
 }
 
-/// Calls `check` with rows of all tails and of magnitudes up to a size, which it is told, unaligned; a quarter of them with a value that is not finite, or 0.
-pub(crate) fn for_rows_of_all_sizes(seed: u64, check: impl Fn(&[f32], f32)) {
+/// Calls `check` with rows of all tails and of magnitudes up to a size, which it is told,
+/// unaligned; a quarter of them with a value that is not finite, or 0.
+pub(crate) fn for_rows_of_all_sizes(seed: u64, mut check: impl FnMut(&[f32], f32)) {
     let mut random = Random(seed);
     for n in (0..140).chain([1024, 4096]) {
         for size in [1e-38, 1e-31, 1e-29, 1.0, 3e38] {

@@ -29,12 +29,14 @@ pub enum WeightData<'a> {
     I8 {
         /// `rows * cols` values.
         q: &'a [i8],
-        /// One scale a row.
+        /// One scale per row.
         scale: &'a [f32],
     },
-    /// Group-wise int4: weight = `(n - 8) * scale[r][c / 32]`, n in 0..=15; activations are quantised to int8 per row.
+    /// Group-wise int4: weight = `(n - 8) * scale[r][c / 32]`, n in 0..=15; activations are
+    /// quantised to int8 per row.
     I4 {
-        /// `rows * ceil(cols / 2)` bytes: column 2i in the low nibble of byte i of its row, 2i + 1 in the high one.
+        /// `rows * ceil(cols / 2)` bytes: column 2i in the low nibble of byte i of its row, 2i + 1
+        /// in the high one.
         q: &'a [u8],
         /// `rows * ceil(cols / 32)` scales.
         scale: &'a [f16],

@@ -1,16 +1,19 @@
-//! Rotary position phases (Su et al. 2021), half-split pairing: channel `i` turns with channel `i + head_dim / 2`.
+//! Rotary position phases (Su et al. 2021), half-split pairing: channel `i` turns with channel `i +
+//! head_dim / 2`.
 
 use std::f64::consts::TAU;
 
-/// Tokens after which all phases come again, a power of two. Of the flow network's, which has one a block: 26 days.
+/// Tokens after which all phases come again, a power of two. Of the flow network's, which has one a
+/// block: 26 days.
 pub const PERIOD: u64 = 1 << 24;
 
 /// Frequencies of one head width, whole turns in [`PERIOD`] tokens.
 ///
-/// `10000^(-2i / head_dim)` rad a token is rounded to a multiple of `2 pi / PERIOD`, by at most 1.9e-7 rad. Two tokens of a
-/// window of 100 differ by it in their phase by 2e-5 rad at most, less than keys of 11 bits resolve. For that the phase of
-/// token `t` is a function of `t mod PERIOD` that is computed in whole numbers: no token is too late to be exact, and a session
-/// does to the bit what it did a period before.
+/// `10000^(-2i / head_dim)` rad a token is rounded to a multiple of `2 pi / PERIOD`, by at most
+/// 1.9e-7 rad. Two tokens of a window of 100 differ by it in their phase by 2e-5 rad at most, less
+/// than keys of 11 bits resolve. For that the phase of token `t` is a function of `t mod PERIOD`
+/// that is computed in whole numbers: no token is too late to be exact, and a session does to the
+/// bit what it did a period before.
 #[derive(Debug, Clone)]
 pub struct Rope {
     turns: Vec<u64>,
@@ -23,14 +26,6 @@ pub struct Phases {
     pub cos: Vec<f32>,
     /// Sines.
     pub sin: Vec<f32>,
-}
-
-impl Phases {
-    /// Copies the first `rows` rows of `other`, `half` phases each, to the rows from `to` on.
-    pub fn copy_rows(&mut self, to: usize, other: &Phases, rows: usize, half: usize) {
-        self.cos[to * half..][..rows * half].copy_from_slice(&other.cos[..rows * half]);
-        self.sin[to * half..][..rows * half].copy_from_slice(&other.sin[..rows * half]);
-    }
 }
 
 impl Rope {

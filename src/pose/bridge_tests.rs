@@ -5,6 +5,7 @@ use super::super::{Decoder, Encoder, feature_count, root_of};
 use super::*;
 use crate::frame::{BLOCK_FRAMES, Frame, Root};
 use crate::kernels::Kernels;
+use crate::normaliser::Metric;
 
 const RADIUS: f32 = 0.1;
 
@@ -72,7 +73,8 @@ fn what_is_left_at_a_border_is_carried_over_it() {
     // A jump at frame 8, and nothing new at the border of frame 12.
     let raw = arm(&rig, 24, |i| if i < 8 { 0.0 } else { 0.6 });
     let angles = angles(&rig, &bridged(&rig, &raw, |_| [0.0; 3]));
-    // The spring as one equation from frame 8 on; MRP and angle differ by the cube of a small angle.
+    // The spring as one equation from frame 8 on; MRP and angle differ by the cube of a small
+    // angle.
     for (i, angle) in angles.iter().enumerate().skip(8) {
         let t = (i - 8) as f32 / 1.5;
         let want = 0.6 - 0.6 * (1.0 + t) * (-t).exp();
@@ -118,13 +120,13 @@ fn decoder(rig: &Rig, frames: Option<f32>) -> Decoder {
 fn blocks(decoder: &mut Decoder, recording: &Walk) -> Vec<Frame> {
     let mut encoder = Encoder::new(RADIUS);
     let width = feature_count(recording.rig.len());
-    let mut x = vec![0.0; BLOCK_FRAMES * width];
+    let mut x = Metric::zeros(BLOCK_FRAMES * width);
     let mut out = recording.frames.clone();
     for block in out.chunks_exact_mut(BLOCK_FRAMES) {
-        for (frame, x) in block.iter().zip(x.chunks_exact_mut(width)) {
-            encoder.encode(frame.root, &frame.global, x);
+        for (i, frame) in block.iter().enumerate() {
+            encoder.encode(frame.root, &frame.global, x.part_mut(i..i + 1, width));
         }
-        decoder.decode_block(&x, block).unwrap();
+        decoder.decode_block(x.view(), block).unwrap();
     }
     out
 }

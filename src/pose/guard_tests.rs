@@ -1,19 +1,19 @@
-use super::super::features::{Decoder, Encoder};
-use super::super::{feature_count, synthetic};
+use super::super::{Decoder, Encoder, feature_count, synthetic};
 use super::*;
 use crate::frame::{Frame, ROOT_CHANNELS};
 use crate::kernels::Kernels;
+use crate::normaliser::Metric;
 use glam::Vec3;
 
 const RADIUS: f32 = 0.1;
 
 /// Features of somebody who walks and gestures.
-fn walk(frames: usize) -> (Rig, Vec<Vec<f32>>) {
+fn walk(frames: usize) -> (Rig, Vec<Metric>) {
     let recording = synthetic::walk(frames);
     let mut encoder = Encoder::new(RADIUS);
     let features = recording.frames.iter().map(|f| {
-        let mut x = vec![0.0; feature_count(f.global.len())];
-        encoder.encode(f.root, &f.global, &mut x);
+        let mut x = Metric::zeros(feature_count(f.global.len()));
+        encoder.encode(f.root, &f.global, x.view_mut());
         x
     });
     (recording.rig.clone(), features.collect())
@@ -23,10 +23,10 @@ fn decoder(rig: &Rig) -> Decoder {
     Decoder::new(Kernels::detect().unwrap(), rig, RADIUS).with_stance(rig).with_guard()
 }
 
-fn decode(decoder: &mut Decoder, features: &[Vec<f32>]) -> Vec<Frame> {
-    let one = |x: &Vec<f32>| {
+fn decode(decoder: &mut Decoder, features: &[Metric]) -> Vec<Frame> {
+    let one = |x: &Metric| {
         let mut frame = Frame::empty(0);
-        decoder.decode(x, &mut frame).unwrap();
+        decoder.decode(x.view(), &mut frame).unwrap();
         frame
     };
     features.iter().map(one).collect()
@@ -38,7 +38,8 @@ fn fling(x: &mut [f32], j: usize, by: Vec3) {
     vertices.iter_mut().for_each(|v| *v = (Vec3::from(*v) + by).to_array());
 }
 
-/// Largest step of a joint and of the root in the world from one frame to the next, metres; everything must be finite.
+/// Largest step of a joint and of the root in the world from one frame to the next, metres;
+/// everything must be finite.
 fn largest_step(frames: &[Frame]) -> f32 {
     let step = |w: &[Frame]| {
         assert!(w[1].global.iter().all(finite) && w[1].local.iter().all(|q| q.is_finite()) && w[1].hips.is_finite());
@@ -57,7 +58,8 @@ fn motion_of_a_body_is_not_touched() {
     assert_eq!(guarded.guard_stats(), GuardStats::default());
 }
 
-/// A few frames of rubbish, of every kind: no joint goes further in a frame than it does without, but for the cross-fade.
+/// A few frames of rubbish, of every kind: no joint goes further in a frame than it does without,
+/// but for the cross-fade.
 #[test]
 fn rubbish_is_held_and_faded_over() {
     let (rig, features) = walk(300);
@@ -71,7 +73,7 @@ fn rubbish_is_held_and_faded_over() {
     ];
     for (k, rubbish) in kinds.into_iter().enumerate() {
         let mut features = features.clone();
-        features[100..103].iter_mut().for_each(|x| rubbish(x));
+        features[100..103].iter_mut().for_each(|x| rubbish(x.values_mut()));
         let mut decoder = decoder(&rig);
         let frames = decode(&mut decoder, &features);
         let step = largest_step(&frames);
@@ -86,15 +88,16 @@ fn rubbish_is_held_and_faded_over() {
     }
 }
 
-/// Rubbish from the first frame on: the pose before it is held, or the rig at rest where there is none.
+/// Rubbish from the first frame on: the pose before it is held, or the rig at rest where there is
+/// none.
 #[test]
 fn rubbish_for_ever_is_a_breathing_pose() {
     let (rig, features) = walk(5);
-    let rubbish = vec![vec![f32::NAN; features[0].len()]; 400];
+    let rubbish = vec![Metric::new(vec![f32::NAN; features[0].values().len()]); 400];
     for primed in [true, false] {
         let mut decoder = decoder(&rig);
         if primed {
-            decoder.prime(&features[4]);
+            decoder.prime(features[4].view());
         }
         let frames = decode(&mut decoder, &rubbish);
         assert!(largest_step(&frames) < 0.002, "it breathes, no more");
@@ -109,17 +112,40 @@ fn rubbish_for_ever_is_a_breathing_pose() {
     }
 }
 
+/// No features at all are answered as features without a number are, bit for bit, wherever they
+/// come.
+#[test]
+fn a_missing_block_is_a_block_of_rubbish() {
+    let (rig, features) = walk(120);
+    let rubbish = Metric::new(vec![f32::NAN; features[0].values().len()]);
+    let (mut missing, mut rubbished) = (decoder(&rig), decoder(&rig));
+    for (i, x) in features.iter().enumerate() {
+        let mut frames = [Frame::empty(0), Frame::empty(0)];
+        let lost = i < 2 || (40..44).contains(&i) || i == 50 || (80..100).contains(&i);
+        if lost {
+            missing.miss_block_on(None, &mut frames[..1]);
+        } else {
+            missing.decode(x.view(), &mut frames[0]).unwrap();
+        }
+        rubbished.decode(if lost { rubbish.view() } else { x.view() }, &mut frames[1]).unwrap();
+        assert_eq!(frames[0], frames[1], "frame {i}");
+    }
+    assert_eq!(missing.guard_stats(), rubbished.guard_stats());
+    assert_eq!(missing.guard_stats().non_finite, 2 + 4 + 1 + 20);
+}
+
 #[test]
 fn a_limb_that_stays_out_of_reach_is_never_shown() {
     let (rig, mut features) = walk(200);
-    features[50..].iter_mut().for_each(|x| fling(x, 6, Vec3::X * 5.0));
+    features[50..].iter_mut().for_each(|x| fling(x.values_mut(), 6, Vec3::X * 5.0));
     let frames = decode(&mut decoder(&rig), &features);
     let far = |f: &Frame| f.global.iter().map(|j| j.position.distance(f.hips)).fold(0.0, f32::max);
     assert!(frames.iter().all(|f| far(f) < 2.0));
     assert!(frames[50..].iter().all(|f| f.held == 1.0));
 }
 
-/// A pause of any length: motion slows down within half a second and comes back from where it was decoded last.
+/// A pause of any length: motion slows down within half a second and comes back from where it was
+/// decoded last.
 #[test]
 fn a_pause_eases_out_and_fades_in() {
     let (rig, features) = walk(260);
@@ -147,13 +173,13 @@ fn shown_features_are_those_of_the_frame() {
     decode(&mut first, &features);
     let mut held = Frame::empty(0);
     first.hold_block(std::slice::from_mut(&mut held));
-    let mut x = vec![0.0; features[0].len()];
-    first.shown(&mut x);
+    let mut x = Metric::zeros(features[0].values().len());
+    first.shown(x.view_mut());
     let mut again = Decoder::new(Kernels::detect().unwrap(), &rig, RADIUS);
     again.reset(held.root);
     let mut frame = Frame::empty(0);
-    x[..ROOT_CHANNELS].fill(0.0);
-    again.decode(&x, &mut frame).unwrap();
+    x.values_mut()[..ROOT_CHANNELS].fill(0.0);
+    again.decode(x.view(), &mut frame).unwrap();
     let error = frame.global.iter().zip(&held.global).map(|(a, b)| a.position.distance(b.position)).fold(0.0, f32::max);
     assert!(error < 1e-4, "{error} m");
 }

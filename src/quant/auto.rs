@@ -1,11 +1,13 @@
 //! The scheme of each layer by measured sensitivity.
 //!
-//! 1. Each layer is quantised alone, and the error of teacher-forced blocks is measured: blocks of the reference sampler for the flow,
-//!    single steps for the student, the way through encoder and decoder for the VAE.
-//! 2. Layers are raised (int4 to int8 to f16; a level that would not help is skipped) one after the other, those first that give back the most
-//!    squared error a byte, until the errors that are left, added in squares, are within the budget.
-//! 3. The whole bundle is measured. While it is over the budget, the next layers are raised; each round raises at least one, so it
-//!    ends at the latest when everything is f16.
+//! 1. Each layer is quantised alone, and the error of teacher-forced blocks is measured: blocks of
+//!    the reference sampler for the flow, single steps for the student, the way through encoder and
+//!    decoder for the VAE.
+//! 2. Layers are raised (int4 to int8 to f16; a level that would not help is skipped) one after the
+//!    other, those first that give back the most squared error per byte, until the errors that are
+//!    left, added in squares, are within the budget.
+//! 3. The whole bundle is measured. While it is over the budget, the next layers are raised; each
+//!    round raises at least one, so it ends at the latest when everything is f16.
 
 use super::Rounder;
 use super::keep::Keep;
@@ -19,6 +21,7 @@ use crate::error::Result;
 use crate::frame::Sampler;
 use crate::kernels::Scheme;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// What `--auto` is given.
 pub struct Budget<'a> {
@@ -59,10 +62,11 @@ struct Candidate<'a> {
     next: Option<(Scheme, f64)>,
 }
 
-/// Raises `schemes` until blocks are within `budget`. Layers that `keep` names keep the scheme that it gave them.
+/// Raises `schemes` until blocks are within `budget`. Layers that `keep` names keep the scheme that
+/// it gave them.
 pub(super) fn choose(
     file: &BundleFile<'_>,
-    reference: &Engine,
+    reference: &Arc<Engine>,
     rounder: &Rounder<'_>,
     mut schemes: BTreeMap<String, Scheme>,
     keep: &[Keep],
@@ -115,7 +119,8 @@ pub(super) fn choose(
 }
 
 impl Candidate<'_> {
-    /// Finds the next better scheme that takes off at least half of the squared error; f16 counts as exact.
+    /// Finds the next better scheme that takes off at least half of the squared error; f16 counts
+    /// as exact.
     fn look_ahead(&mut self, meter: &Meter<'_>) -> Result<()> {
         self.next = match self.scheme {
             Scheme::I4 => {
@@ -143,19 +148,19 @@ fn extra_bytes(layer: &Layer, from: Scheme, to: Scheme) -> f64 {
 /// Measures bundles by teacher-forced blocks.
 struct Meter<'a> {
     file: &'a BundleFile<'a>,
-    reference: &'a Engine,
+    reference: &'a Arc<Engine>,
     rounder: &'a Rounder<'a>,
-    teachers: Vec<Teacher<'a>>,
+    teachers: Vec<Teacher>,
 }
 
 impl<'a> Meter<'a> {
     fn new(
         file: &'a BundleFile<'a>,
-        reference: &'a Engine,
+        reference: &'a Arc<Engine>,
         rounder: &'a Rounder<'a>,
         budget: &Budget<'_>,
     ) -> Result<Self> {
-        let samplers = [Some(Sampler::Midpoint(4)), reference.config().student.map(|_| Sampler::Single)];
+        let samplers = [Some(Sampler::Midpoint4), reference.config().student.map(|_| Sampler::Single)];
         let teachers = samplers
             .into_iter()
             .flatten()
@@ -164,7 +169,8 @@ impl<'a> Meter<'a> {
         Ok(Self { file, reference, rounder, teachers })
     }
 
-    /// Whether anything that is measured depends on layer `name`; the encoder's variance serves training alone.
+    /// Whether anything that is measured depends on layer `name`; the encoder's variance serves
+    /// training alone.
     fn reaches(&self, name: &str) -> bool {
         name != "vae.encoder.logvar"
     }
@@ -173,7 +179,8 @@ impl<'a> Meter<'a> {
     fn alone(&self, layer: &Layer, scheme: Scheme) -> Result<f64> {
         let stored = self.rounder.one(layer, scheme)?;
         let student = layer.name.starts_with("student.");
-        // The student's layers are seen by single steps alone; for all others the reference sampler will do.
+        // The student's layers are seen by single steps alone; for all others the reference sampler
+        // will do.
         let teachers = if student { &self.teachers[1..] } else { &self.teachers[..1] };
         self.measure(&[(layer, stored)], teachers)
     }
@@ -182,8 +189,9 @@ impl<'a> Meter<'a> {
         self.measure(&self.rounder.all(schemes)?, &self.teachers)
     }
 
-    /// The largest of the errors: of each sampler's blocks, and of the way through encoder and decoder.
-    fn measure(&self, weights: &[(&Layer, StoredWeights)], teachers: &[Teacher<'_>]) -> Result<f64> {
+    /// The largest of the errors: of each sampler's blocks, and of the way through encoder and
+    /// decoder.
+    fn measure(&self, weights: &[(&Layer, StoredWeights)], teachers: &[Teacher]) -> Result<f64> {
         // As an int8 bundle: there nothing but the matrices changes.
         let bytes = write::bundle(self.file, self.reference, weights, Scheme::I8)?;
         let engine = Engine::from_file(&BundleFile::from_bytes(bytes, self.file.path()), self.reference.kernels())?;

@@ -7,7 +7,8 @@ use crate::kernels::Scheme;
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
-/// Layers that stay floats: `PATTERN` (f16) or `PATTERN=f32`; `*` in a pattern stands for any characters, none included.
+/// Layers that stay floats: `PATTERN` (f16) or `PATTERN=f32`; `*` in a pattern stands for any
+/// characters, none included.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Keep {
     pattern: String,
@@ -57,7 +58,8 @@ fn fits(pattern: &[u8], name: &[u8]) -> bool {
     pattern[p..].iter().all(|&c| c == b'*')
 }
 
-/// The scheme of each layer. A layer of f16 that is kept at f32 stays f16: there is nothing to gain.
+/// The scheme of each layer. A layer of f16 that is kept at f32 stays f16: there is nothing to
+/// gain.
 pub(super) fn apply(options: &Options<'_>, layers: &[Layer]) -> Result<BTreeMap<String, Scheme>> {
     for k in options.keep {
         if !layers.iter().any(|layer| k.fits(&layer.name)) {

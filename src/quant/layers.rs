@@ -40,13 +40,16 @@ pub fn layers(tensors: &Tensors<'_>) -> Result<Vec<Layer>> {
 /// Layers of the audio encoder with as many weights as this are worth their int8.
 const LARGE: usize = 150_000;
 
-/// The scheme that layer `name` gets when `scheme` is asked for, if it is large enough to be quantised at all.
+/// The scheme that layer `name` gets when `scheme` is asked for, if it is large enough to be
+/// quantised at all.
 ///
-/// - The flow's input projection and its latent embedding are multiplied with each other when a bundle is loaded: f16 at most.
-/// - The audio encoder's features condition everything that follows. Its three largest convolutions are int8 in int8 and int4 bundles,
-///   its other layers f16 and int8.
-/// - The last layers of flow and decoder are int8 in int4 bundles. They are small and nothing evens their errors out: measured on the base model,
-///   the decoder's alone was two thirds of the joint error.
+/// - The flow's input projection and its latent embedding are multiplied with each other when a
+///   bundle is loaded: f16 at most.
+/// - The audio encoder's features condition everything that follows. Its three largest convolutions
+///   are int8 in int8 and int4 bundles, its other layers f16 and int8.
+/// - The last layers of flow and decoder are int8 in int4 bundles. They are small and nothing evens
+///   their errors out: measured on the base model, the decoder's alone was two thirds of the joint
+///   error.
 pub fn default_scheme(name: &str, elements: usize, scheme: Scheme) -> Scheme {
     let folded = name.ends_with(".input") || name.ends_with(".embed_latent");
     let audio = name.starts_with("audio.");

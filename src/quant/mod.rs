@@ -7,17 +7,19 @@
 //! | `round` | rounding to each scheme, with the scale that loses least |
 //! | `nearest_plane` | rounding by activation statistics |
 //! | `calibration` | those statistics, of a reference run over a conversation |
-//! | `scene`, `walker` | a conversation in blocks, and an engine driven block by block |
+//! | `scene` | a conversation in blocks, played to sessions |
 //! | `teacher` | what quantisation does to a block: teacher-forced runs of two engines side by side |
 //! | `auto` | the scheme of each layer by measured sensitivity |
 //! | `write` | putting the bundle together |
 //!
-//! Weights are quantised one layer at a time: int8 symmetric per output channel, int4 symmetric in groups of 32 columns with an f16
-//! scale. Activations are quantised when they come, per row, to int8 or, where
-//! [`int16_activations`](crate::bundle::int16_activations) says so, int16; nothing about them is stored. In int8 and int4 bundles biases, norms,
-//! embeddings of tokens and statistics stay as they are; in f16 bundles all but the statistics and the decoder's are f16 as well. The frames of the idle clip, a
-//! fiftieth of an int4 bundle, give way to their latents, which are all that an engine wants of them. The result depends on the input bundle and the options
-//! alone, bit for bit.
+//! Weights are quantised one layer at a time: int8 symmetric per output channel, int4 symmetric in
+//! groups of 32 columns with an f16 scale. Activations are quantised when they come, per row, to
+//! int8 or, where [`int16_activations`](crate::bundle::int16_activations) says so, int16; nothing
+//! about them is stored. In int8 and int4 bundles biases, norms, embeddings of tokens and
+//! statistics stay as they are; in f16 bundles all but the statistics and the decoder's are f16 as
+//! well. The frames of the idle clip, a fiftieth of an int4 bundle, give way to their latents,
+//! which are all that an engine wants of them. The result depends on the input bundle and the
+//! options alone, bit for bit.
 
 mod auto;
 mod calibration;
@@ -29,7 +31,6 @@ mod scene;
 mod teacher;
 #[cfg(test)]
 mod tests;
-mod walker;
 mod write;
 
 pub use crate::bundle::SMALL;
@@ -52,12 +53,13 @@ use std::collections::BTreeMap;
 pub struct Options<'a> {
     /// Scheme of every layer that nothing else is said about: `f16`, `i8` or `i4`.
     pub scheme: Scheme,
-    /// Matrices with fewer weights are not made integers, so stay as they are but in f16 bundles; [`SMALL`] unless there is a reason.
+    /// Matrices with fewer weights are not made integers, so stay as they are but in f16 bundles;
+    /// [`SMALL`] unless there is a reason.
     pub smallest: usize,
     /// Layers that stay floats; the last pattern that fits a layer decides.
     pub keep: &'a [Keep],
-    /// What flows through the layers: int8 and int4 weights are rounded so that outputs on such inputs lose least. Without it
-    /// each weight goes to the nearest value.
+    /// What flows through the layers: int8 and int4 weights are rounded so that outputs on such
+    /// inputs lose least. Without it each weight goes to the nearest value.
     pub calibration: Option<&'a Scene>,
     /// Raises layers to better schemes until blocks are within a budget of error.
     pub budget: Option<&'a Budget<'a>>,
@@ -77,8 +79,8 @@ pub struct Quantised {
 /// Quantises the weights of `file`.
 ///
 /// # Errors
-/// Those of loading the bundle; [`ErrorKind::Argument`] when it is quantised already, when a pattern fits no layer, or when a weight
-/// is beyond the range of f16.
+/// Those of loading the bundle; [`ErrorKind::Argument`] when it is quantised already, when a
+/// pattern fits no layer, or when a weight is beyond the range of f16.
 pub fn quantise(file: &BundleFile<'_>, options: &Options<'_>) -> Result<Quantised> {
     let (config, tensors) = file.parse()?;
     refuse_twice(&config, &tensors, options.scheme).map_err(|e| e.with_path(file.path()))?;

@@ -1,19 +1,22 @@
-//! Rounding by activation statistics: each weight makes up for the errors of those rounded before it, as far as the layer's inputs go
-//! together.
+//! Rounding by activation statistics: each weight makes up for the errors of those rounded before
+//! it, as far as the layer's inputs go together.
 //!
-//! The error of a row of outputs is (w - q)' H (w - q) with H the second moments of the inputs. With H = R'R, R upper triangular, it is the
-//! squared length of R (w - q), and rounding from the last column to the first makes each of its components as small as the grid
-//! allows (Babai's nearest plane, 1986; GPTQ of Frantar et al. 2022 does the same in another order).
+//! The error of a row of outputs is (w - q)' H (w - q) with H the second moments of the inputs.
+//! With H = R'R, R upper triangular, it is the squared length of R (w - q), and rounding from the
+//! last column to the first makes each of its components as small as the grid allows (Babai's
+//! nearest plane, 1986; GPTQ of Frantar et al. 2022 does the same in another order).
 
 use super::round::{int4_scale, int8_scale, nearest};
 use crate::bundle::{StoredData, StoredWeights};
 use crate::error::Result;
 use crate::kernels::{I4_GROUP, Scheme};
 
-/// Share of the mean diagonal that is added to the diagonal of H: what has not been seen is taken to be a little of everything.
+/// Share of the mean diagonal that is added to the diagonal of H: what has not been seen is taken
+/// to be a little of everything.
 const DAMPING: f64 = 0.01;
 
-/// R of H + damping = R'R for the second moments `h` (`n x n`, upper triangle read), row-major; `None` where there was no input at all.
+/// R of H + damping = R'R for the second moments `h` (`n x n`, upper triangle read), row-major;
+/// `None` where there was no input at all.
 pub(super) fn factor(h: &[f64], n: usize) -> Option<Vec<f32>> {
     let damping = DAMPING * (0..n).map(|i| h[i * n + i]).sum::<f64>() / n as f64;
     if !(damping > 0.0 && damping.is_finite()) {
@@ -38,7 +41,8 @@ pub(super) fn factor(h: &[f64], n: usize) -> Option<Vec<f32>> {
     Some(r.into_iter().map(|v| v as f32).collect())
 }
 
-/// Rounds as [`round`](super::round()) does, but so that the outputs on inputs with factor `r` lose least.
+/// Rounds as [`round`](super::round()) does, but so that the outputs on inputs with factor `r` lose
+/// least.
 pub(super) fn round_for(w: &[f32], rows: usize, cols: usize, scheme: Scheme, r: &[f32]) -> Result<StoredWeights> {
     let group = if scheme == Scheme::I4 { I4_GROUP } else { cols };
     let (mut i8s, mut i8_scales) = (Vec::new(), Vec::new());

@@ -6,11 +6,12 @@ use crate::error::Result;
 use crate::kernels::{I4_GROUP, Scheme};
 use half::f16;
 
-/// Rounds `rows` x `cols` weights to `scheme`. Scales are searched for the least squared error: clipping the largest weights a little
-/// often leaves the others better off.
+/// Rounds `rows` x `cols` weights to `scheme`. Scales are searched for the least squared error:
+/// clipping the largest weights a little often leaves the others better off.
 ///
 /// # Errors
-/// [`ErrorKind::Argument`](crate::error::ErrorKind::Argument) for a weight, or an int4 scale, beyond the range of f16.
+/// [`ErrorKind::Argument`](crate::error::ErrorKind::Argument) for a weight, or an int4 scale,
+/// beyond the range of f16.
 ///
 /// # Panics
 /// When there are not `rows * cols` weights.
@@ -47,7 +48,8 @@ pub fn round(w: &[f32], rows: usize, cols: usize, scheme: Scheme) -> Result<Stor
     Ok(StoredWeights { rows, cols, data })
 }
 
-/// 10 log10 of the power of `reference` over that of the difference, dB; infinite where there is none.
+/// 10 log10 of the power of `reference` over that of the difference, dB; infinite where there is
+/// none.
 ///
 /// # Panics
 /// When lengths differ.
@@ -95,7 +97,8 @@ pub(super) fn int8_scale(row: &[f32]) -> f32 {
     best(scales, |&s| error(row, s, -127.0, 127.0)).unwrap_or(top / 127.0)
 }
 
-/// Scale of a group of int4 weights. Nibbles reach further down than up, so a negative scale may fit better.
+/// Scale of a group of int4 weights. Nibbles reach further down than up, so a negative scale may
+/// fit better.
 pub(super) fn int4_scale(group: &[f32]) -> Result<f16> {
     let top = largest(group);
     half(top / 7.0)?;

@@ -1,47 +1,45 @@
-//! A conversation cut into blocks.
+//! A conversation of whole blocks, played to sessions as a live caller would.
 
 use super::argument;
 use crate::error::Result;
-use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES, Root};
+use crate::frame::{BLOCK_SAMPLES, SAMPLE_RATE};
+use crate::session::Session;
 use glam::Vec3;
 
-/// A conversation cut into blocks.
+/// A conversation of whole blocks.
 #[derive(Debug, Clone)]
 pub struct Scene {
-    pub(super) agent: Vec<f32>,
-    pub(super) user: Vec<f32>,
-    /// The user's head at each frame.
-    pub(super) heads: Vec<Option<Vec3>>,
+    agent: Option<Vec<f32>>,
+    user: Option<Vec<f32>>,
+    /// The user's head: session time, seconds, and place, world metres.
+    heads: Vec<(f64, Vec3)>,
     blocks: usize,
-    pub(super) gaze: Option<f32>,
+    gaze: Option<f32>,
 }
 
 impl Scene {
-    /// The whole blocks of `heads`, the user's head at each frame (world metres, `None` where unknown), with both voices
-    /// (24 kHz mono; one that ends before is silent from there), and a gaze target or none.
+    /// `blocks` blocks: voices (24 kHz mono, sample `n` at `n / 24000` s; `None` is absent, and one
+    /// that ends is silent from there), the user's head as a tracker would send it (seconds in
+    /// ascending order, world metres), and a gaze target or none.
     ///
     /// # Errors
-    /// [`ErrorKind::Argument`](crate::error::ErrorKind::Argument) when there is not a whole block.
-    pub fn new(agent: &[f32], user: &[f32], heads: &[Option<Vec3>], gaze: Option<f32>) -> Result<Self> {
-        let blocks = heads.len() / BLOCK_FRAMES;
+    /// [`ErrorKind::Argument`](crate::error::ErrorKind::Argument) for 0 blocks.
+    pub fn new(
+        agent: Option<&[f32]>,
+        user: Option<&[f32]>,
+        heads: Vec<(f64, Vec3)>,
+        blocks: usize,
+        gaze: Option<f32>,
+    ) -> Result<Self> {
         if blocks == 0 {
             return Err(argument("the conversation is shorter than a block of four frames".to_owned()));
         }
-        let voice = |v: &[f32]| {
-            let mut v = v.to_vec();
-            v.resize(blocks * BLOCK_SAMPLES, 0.0);
-            v
-        };
-        Ok(Self {
-            agent: voice(agent),
-            user: voice(user),
-            heads: heads[..blocks * BLOCK_FRAMES].to_vec(),
-            blocks,
-            gaze,
-        })
+        let voice = |voice: &[f32]| voice[..voice.len().min(blocks * BLOCK_SAMPLES)].to_vec();
+        Ok(Self { agent: agent.map(voice), user: user.map(voice), heads, blocks, gaze })
     }
 
-    /// The same user and length with the two voices exchanged: a conversation that nothing was chosen by.
+    /// The same user and length with the two voices exchanged: a conversation that nothing was
+    /// chosen by.
     #[must_use]
     pub fn exchanged(&self) -> Self {
         Self { agent: self.user.clone(), user: self.agent.clone(), ..self.clone() }
@@ -52,20 +50,35 @@ impl Scene {
         self.blocks
     }
 
-    /// Of a voice, what `block` may know with a delay of `delay` blocks.
-    pub(super) fn samples(voice: &[f32], block: usize, delay: u32) -> Option<&[f32]> {
-        let heard = block.checked_sub(delay as usize)?;
-        Some(&voice[heard * BLOCK_SAMPLES..][..BLOCK_SAMPLES])
+    /// The gaze target.
+    pub fn gaze(&self) -> Option<f32> {
+        self.gaze
     }
 
-    /// The user over the block that `block` may know, in the agent's frame.
-    pub(super) fn positions(&self, block: usize, delay: u32, root: &Root) -> Option<[f32; 2 * BLOCK_FRAMES]> {
-        let seen = block.checked_sub(delay as usize)?;
-        let mut positions = [0.0; 2 * BLOCK_FRAMES];
-        for (i, xz) in positions.chunks_exact_mut(2).enumerate() {
-            let local = root.to_local(self.heads[seen * BLOCK_FRAMES + i]?);
-            xz.copy_from_slice(&[local.x, local.z]);
+    /// Plays it to a session at its start, through the session's own inputs; `made` is called after
+    /// each block, with its number.
+    ///
+    /// # Errors
+    /// Those of pushing and polling, and of `made`.
+    pub fn play(&self, session: &mut Session, mut made: impl FnMut(&mut Session, usize) -> Result<()>) -> Result<()> {
+        let mut heads = self.heads.iter().peekable();
+        let chunk = |voice: &Option<Vec<f32>>, block: usize| -> Option<Vec<f32>> {
+            Some(voice.as_ref()?.chunks(BLOCK_SAMPLES).nth(block)?.to_vec())
+        };
+        for block in 0..self.blocks {
+            let now = session.next_due();
+            if let Some(samples) = chunk(&self.agent, block) {
+                session.push_agent_audio(&samples, SAMPLE_RATE)?;
+            }
+            if let Some(samples) = chunk(&self.user, block) {
+                session.push_user_audio(&samples, SAMPLE_RATE)?;
+            }
+            while let Some((time, position)) = heads.next_if(|(time, _)| *time <= now) {
+                session.push_user_head(*position, *time)?;
+            }
+            session.poll(now)?;
+            made(session, block)?;
         }
-        Some(positions)
+        Ok(())
     }
 }

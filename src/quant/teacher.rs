@@ -1,36 +1,33 @@
-//! Teacher-forced comparison: what another engine makes of each block, given the history that a reference engine made.
+//! Teacher-forced comparison: what another engine makes of each block, given the history that a
+//! reference engine made.
 //!
-//! The reference runs freely over a scene. The candidate then computes every block from the reference's past: the same latents
-//! behind it (through its own weights), the same root and posture, the same noise, the same user. So the difference is that of one
-//! block, and does not grow. Its voices go through its own audio encoder. Neither re-anchors.
+//! The reference is a session that runs freely over a scene: what it is told, free gaze included,
+//! is what any session with these options is told. The candidate is a session too, and computes
+//! every block from the reference's past: the same latents behind it (through its own weights), the
+//! same root and posture, the same noise, the same user. So the difference is that of one block,
+//! and does not grow. Its voices go through its own audio encoder. Neither re-anchors.
 
 use super::argument;
 use super::scene::Scene;
-use super::walker::Walker;
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::frame::{Frame, Sampler};
 use crate::kernels::{Activations, KvDtype};
+use crate::normaliser::{Metric, Standardised};
 use crate::pose;
+use crate::session::{Anchoring, MadeBlock, Session, SessionOptions};
+use crate::vae::RoundTrip;
 use glam::Vec3;
-
-/// A block of the reference.
-pub(super) struct Step {
-    pub(super) z: Vec<f32>,
-    features: Vec<f32>,
-    pub(super) after: pose::Decoder,
-    frames: Vec<Frame>,
-}
+use std::sync::Arc;
 
 /// A reference engine's run over a scene, which candidates are compared with.
-pub struct Teacher<'e> {
-    engine: &'e Engine,
+pub struct Teacher {
+    engine: Arc<Engine>,
     scene: Scene,
-    sampler: Sampler,
-    seed: u64,
-    steps: Vec<Step>,
+    options: SessionOptions,
+    blocks: Vec<MadeBlock>,
     /// The reference's features encoded and decoded again.
-    round_trip: Vec<Vec<f32>>,
+    round_trip: Vec<Metric>,
 }
 
 /// One frame of a candidate against the reference's.
@@ -51,8 +48,8 @@ pub struct Forced {
     pub frames: Vec<FrameError>,
     /// The reference's latents and the candidate's, standardised, block after block.
     pub latents: [Vec<f32>; 2],
-    /// The reference's decoded features encoded and decoded again, joints against those of the reference's encoder and decoder: metres,
-    /// joint after joint, frame after frame.
+    /// The reference's decoded features encoded and decoded again, joints against those of the
+    /// reference's encoder and decoder: metres, joint after joint, frame after frame.
     pub round_trip: Vec<f32>,
 }
 
@@ -74,94 +71,109 @@ fn mean<'a>(values: impl IntoIterator<Item = &'a f32>) -> f64 {
     sum / n.max(1) as f64
 }
 
-impl<'e> Teacher<'e> {
+impl Teacher {
     /// Runs `engine` over `scene`; `activations` listens to its layers.
     ///
     /// # Errors
-    /// [`ErrorKind::Argument`](crate::error::ErrorKind::Argument) for the single step where the bundle has no student.
+    /// [`ErrorKind::Argument`](crate::error::ErrorKind::Argument) for a sampler that the bundle has
+    /// no network for.
     pub fn new(
-        engine: &'e Engine,
+        engine: &Arc<Engine>,
         scene: Scene,
         sampler: Sampler,
         seed: u64,
         activations: &mut Option<Activations>,
     ) -> Result<Self> {
-        if sampler == Sampler::Single && engine.student.is_none() {
-            return Err(argument("the single-step sampler needs a bundle with a student network".to_owned()));
-        }
-        let mut walker = Walker::new(engine, sampler, seed, &engine.idle, activations.take())?;
-        let mut steps = Vec::with_capacity(scene.blocks());
-        for block in 0..scene.blocks() {
-            walker.block(&scene, block)?;
-            steps.push(Step {
-                z: walker.z.clone(),
-                features: walker.features.clone(),
-                after: walker.motion.clone(),
-                frames: walker.frames.clone(),
-            });
-        }
-        *activations = walker.exec.listen(None);
-        let mut this = Self { engine, scene, sampler, seed, steps, round_trip: Vec::new() };
+        let options = SessionOptions {
+            seed,
+            sampler,
+            gaze: scene.gaze(),
+            diagnostics: Anchoring::Never.into(),
+            ..SessionOptions::default()
+        };
+        let mut session = Session::listened(Arc::clone(engine), options.clone(), activations.take())?;
+        let mut blocks = Vec::with_capacity(scene.blocks());
+        scene.play(&mut session, |session, _| {
+            blocks.push(session.made());
+            Ok(())
+        })?;
+        *activations = session.stop_listening();
+        let mut this = Self { engine: Arc::clone(engine), scene, options, blocks, round_trip: Vec::new() };
         this.round_trip = this.through(engine, activations)?;
         Ok(this)
     }
 
     /// The sampler.
     pub fn sampler(&self) -> Sampler {
-        self.sampler
+        self.options.sampler
+    }
+
+    /// What the reference's session was made with.
+    pub fn options(&self) -> &SessionOptions {
+        &self.options
     }
 
     /// The reference's frames, block after block.
     pub fn frames(&self) -> impl Iterator<Item = &Frame> {
-        self.steps.iter().flat_map(|s| &s.frames)
+        self.blocks.iter().flat_map(|block| &block.frames)
     }
 
     /// What `candidate` makes of every block.
     ///
     /// # Errors
-    /// [`ErrorKind::Argument`](crate::error::ErrorKind::Argument) when it has another rig or other sizes than the reference.
-    pub fn compare(&self, candidate: &Engine) -> Result<Forced> {
+    /// [`ErrorKind::Argument`](crate::error::ErrorKind::Argument) when it has another rig or other
+    /// sizes than the reference, or tells its sessions something else (calibration of gaze,
+    /// guidance, temperature).
+    pub fn compare(&self, candidate: &Arc<Engine>) -> Result<Forced> {
         let (a, b) = (self.engine.config(), candidate.config());
         if (&a.rig, a.vae, a.flow, &a.audio) != (&b.rig, b.vae, b.flow, &b.audio) {
             return Err(argument("the candidate is not made from the reference: rig or sizes differ".to_owned()));
         }
-        let mut walker = Walker::new(candidate, self.sampler, self.seed, &self.engine.idle, None)?;
-        let mut forced = Forced { frames: Vec::new(), latents: [Vec::new(), Vec::new()], round_trip: Vec::new() };
-        for (block, step) in self.steps.iter().enumerate() {
-            walker.block(&self.scene, block)?;
-            forced.latents[0].extend_from_slice(&step.z);
-            forced.latents[1].extend_from_slice(&walker.z);
-            forced.frames.extend(step.frames.iter().zip(&walker.frames).map(|(a, b)| FrameError::between(a, b)));
-            walker.follow(step);
+        if (&a.session, &a.gaze) != (&b.session, &b.gaze) {
+            let message = "the candidate is not made from the reference as it is: defaults of sessions or the calibration of gaze \
+                           differ; calibrate first, then quantise";
+            return Err(argument(message.to_owned()));
         }
+        let mut session = Session::listened(Arc::clone(candidate), self.options.clone(), None)?;
+        session.reset_to(self.engine.idle.view());
+        let mut forced = Forced { frames: Vec::new(), latents: [Vec::new(), Vec::new()], round_trip: Vec::new() };
+        self.scene.play(&mut session, |session, block| {
+            let (taught, made) = (&self.blocks[block], session.made());
+            forced.latents[0].extend_from_slice(taught.z.values());
+            forced.latents[1].extend_from_slice(made.z.values());
+            forced.frames.extend(taught.frames.iter().zip(&made.frames).map(|(a, b)| FrameError::between(a, b)));
+            session.follow(taught);
+            Ok(())
+        })?;
         let radius = a.pose.radius;
         let joints = |x: &[f32]| -> Vec<Vec3> {
             let (_, joints) = x.split_at(crate::frame::ROOT_CHANNELS);
             let vertices = joints.as_chunks::<{ crate::frame::JOINT_CHANNELS }>().0;
             vertices.iter().map(|v| pose::icosahedron::decode(v, radius).0).collect()
         };
+        let width = candidate.features();
         for (a, b) in self.round_trip.iter().zip(self.through(candidate, &mut None)?) {
-            for (a, b) in a.chunks_exact(candidate.features()).zip(b.chunks_exact(candidate.features())) {
+            for (a, b) in a.values().chunks_exact(width).zip(b.values().chunks_exact(width)) {
                 forced.round_trip.extend(joints(a).iter().zip(joints(b)).map(|(a, b)| a.distance(b)));
             }
         }
         Ok(forced)
     }
 
-    /// The reference's features of each block through an engine's encoder and decoder: unstandardised features.
-    fn through(&self, engine: &Engine, activations: &mut Option<Activations>) -> Result<Vec<Vec<f32>>> {
+    /// The reference's features of each block through an engine's encoder and decoder.
+    fn through(&self, engine: &Engine, activations: &mut Option<Activations>) -> Result<Vec<Metric>> {
         let mut exec = engine.exec(1)?;
         exec.listen(activations.take());
-        let (mut encoder, mut decoder) = (engine.encoder()?.state(KvDtype::F16), engine.decoder.state(KvDtype::F16));
-        let mut z = vec![0.0; engine.config().vae.latent];
-        let mut out = Vec::with_capacity(self.steps.len());
+        let latent = engine.config().vae.latent;
+        let mut networks = RoundTrip::new(engine.encoder()?, &engine.decoder, latent, KvDtype::F16);
+        let mut out = Vec::with_capacity(self.blocks.len());
         exec.begin();
-        for step in &self.steps {
-            let mut x = vec![0.0; step.features.len()];
-            engine.encoder()?.step(&mut exec, &mut encoder, &step.features, &mut z);
-            engine.decoder.step(&mut exec, &mut decoder, &z, &mut x);
-            engine.pose.restore(&mut x);
-            out.push(x);
+        for block in &self.blocks {
+            let len = block.features.values().len();
+            let (mut x, mut metric) = (Standardised::zeros(len), Metric::zeros(len));
+            networks.step(&mut exec, block.features.view(), x.view_mut());
+            engine.pose.restore(x.view(), metric.view_mut());
+            out.push(metric);
         }
         exec.end();
         *activations = exec.listen(None);

@@ -11,8 +11,9 @@ use half::f16;
 use safetensors::Dtype;
 use std::collections::BTreeMap;
 
-/// Puts weights in the place of those of `file` and records their schemes in its config. The idle clip's frames give way to the
-/// latents that `reference` made of them. In an f16 bundle all else is f16 too, but for what [`stays`] names.
+/// Puts weights in the place of those of `file` and records their schemes in its config. The idle
+/// clip's frames give way to the latents that `reference` made of them. In an f16 bundle all else
+/// is f16 too, but for what [`stays`] names.
 pub(super) fn bundle(
     file: &BundleFile<'_>,
     reference: &Engine,
@@ -31,7 +32,7 @@ pub(super) fn bundle(
         let entry = match (name, view.dtype()) {
             (IDLE_FRAMES, _) => {
                 let shape = vec![reference.idle_blocks(), reference.config().vae.latent];
-                (IDLE_LATENTS.to_owned(), Dtype::F32, shape, floats(&reference.idle))
+                (IDLE_LATENTS.to_owned(), Dtype::F32, shape, floats(reference.idle.values()))
             }
             (_, Dtype::F32) if asked == Scheme::F16 && !stays(name, &record) => match narrowed(view.data()) {
                 Some(halves) => (name.to_owned(), Dtype::F16, shape, halves),
@@ -47,9 +48,11 @@ pub(super) fn bundle(
     assemble(&config, &entries)
 }
 
-/// Whether a tensor of floats that is no weight matrix stays f32 in a bundle of halves: statistics, which every pose is scaled by (f16 would
-/// round a height of 1.5 m by up to half a millimetre); the decoder's biases, norms and tokens, through which every pose goes (two thousandths
-/// of the bundle, and half of its error); latents of the idle clip; and the bias of a layer that is kept at f32.
+/// Whether a tensor of floats that is no weight matrix stays f32 in a bundle of halves: statistics,
+/// which every pose is scaled by (f16 would round a height of 1.5 m by up to half a millimetre);
+/// the decoder's biases, norms and tokens, through which every pose goes (two thousandths of the
+/// bundle, and half of its error); latents of the idle clip; and the bias of a layer that is kept
+/// at f32.
 fn stays(name: &str, record: &Quantisation) -> bool {
     let layer = name.strip_suffix(".bias").map(|layer| format!("{layer}.weight"));
     name.starts_with("stats.")

@@ -1,32 +1,36 @@
-//! Re-anchoring: recent motion is encoded anew, so that the latents which the generator builds on are what the encoder
-//! makes of the motion that was shown, however long the session has run.
+//! Re-anchoring: recent motion is encoded anew, so that the latents which the generator builds on
+//! are what the encoder makes of the motion that was shown, however long the session has run.
 //!
-//! Nothing in the networks depends on where in the world the agent is (`ARCHITECTURE.md`), so the world needs no anchor;
-//! what can wander off over minutes is the latent history. Every `period` blocks, or when the agent has gone
-//! `radius` metres, the work is spread over the following blocks, a bounded piece each:
+//! Nothing in the networks depends on where in the world the agent is (`ARCHITECTURE.md`), so the
+//! world needs no anchor; what can wander off over minutes is the latent history. Every `period`
+//! blocks, or when the agent has gone `radius` metres, the work is spread over the following
+//! blocks, a bounded piece each:
 //!
-//! 1. *encode*: the encoder runs through the decoded frames of the last flow window, a few blocks at a time, until it has
-//!    caught up with the present;
-//! 2. *replace*: the new latents take the old ones' place in the history; slot caches are computed anew, a few passes of
-//!    eight tokens a block (what is still to come keeps the old latents' keys, which describe the same motion);
-//! 3. *decode*: a second decoder state runs through the new latents until it has caught up; then both decode the same
-//!    latent once, and the four frames are cross-faded from the one to the other.
+//! 1. *encode*: the encoder runs through the decoded frames of the last flow window, a few blocks
+//!    at a time, until it has caught up with the present;
+//! 2. *replace*: the new latents take the old ones' place in the history; slot caches are computed
+//!    anew, a few passes of eight tokens per block (what is still to come keeps the old latents'
+//!    keys, which describe the same motion);
+//! 3. *decode*: a second decoder state runs through the new latents until it has caught up; then
+//!    both decode the same latent once, and the four frames are cross-faded from the one to the
+//!    other.
 //!
 //! A block that has no time for its share gives the round up; a new one starts when there is time.
 
 use super::diagnostics::Anchoring;
 use super::governor::Share;
 use super::options::SessionOptions;
+use super::tools::Tools;
 use crate::engine::Engine;
-use crate::flow::Generator;
+use crate::flow::{Generator, Stretch};
 use crate::frame::{BLOCK_FRAMES, Root};
-use crate::kernels::Exec;
-use crate::vae::{DecoderState, EncoderState};
+use crate::normaliser::{Metric, Standardised};
+use crate::vae::{DecoderState, Decoding, EncoderState};
 
 /// Blocks that are encoded, or decoded, in one block's time.
-const BLOCKS_A_STEP: u64 = 3;
+const BLOCKS_PER_STEP: u64 = 3;
 /// Passes over a slot cache in one block's time.
-const PASSES_A_STEP: usize = 2;
+const PASSES_PER_STEP: usize = 2;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
@@ -57,14 +61,35 @@ pub(super) struct Anchor {
     /// The decoder that takes over.
     next: DecoderState,
     capacity: u64,
-    /// Decoded features of the last blocks, standardised, and their new latents, unstandardised.
-    features: Vec<f32>,
-    latents: Vec<f32>,
+    /// Decoded features of the last blocks, and their new latents.
+    features: Standardised,
+    latents: Metric,
     width: usize,
     latent: usize,
-    scratch: Vec<f32>,
-    z: Vec<f32>,
+    scratch: Standardised,
+    z: Standardised,
+    restored: Metric,
     count: u64,
+}
+
+/// The block that was just made, and what re-anchoring may change.
+pub(super) struct Moment<'a> {
+    pub(super) generator: &'a mut Generator,
+    /// What `features` come from; another decoder may take over.
+    pub(super) decoder: &'a mut DecoderState,
+    pub(super) latent: Metric<&'a [f32]>,
+    /// What was decoded, which may be cross-faded; `None` where the latent was not usable: what is
+    /// shown instead comes with [`Anchor::amend`].
+    pub(super) features: Option<Standardised<&'a mut [f32]>>,
+    pub(super) root: Root,
+    /// Whether there is time for a share of the work.
+    pub(super) time: bool,
+}
+
+impl Moment<'_> {
+    fn features(&self) -> Option<Standardised<&[f32]>> {
+        self.features.as_ref().map(Standardised::view)
+    }
 }
 
 impl Anchor {
@@ -91,12 +116,13 @@ impl Anchor {
             encoder: engine.encoder.as_ref().map(|encoder| encoder.state(options.diagnostics.cache)),
             next: engine.decoder.state(options.diagnostics.cache),
             capacity,
-            features: vec![0.0; capacity as usize * width],
-            latents: vec![0.0; capacity as usize * latent],
+            features: Standardised::zeros(capacity as usize * width),
+            latents: Metric::zeros(capacity as usize * latent),
             width,
             latent,
-            scratch: vec![0.0; width],
-            z: vec![0.0; latent],
+            scratch: Standardised::zeros(width),
+            z: Standardised::zeros(latent),
+            restored: Metric::zeros(latent),
             count: 0,
         }
     }
@@ -108,16 +134,16 @@ impl Anchor {
         (self.anchor, self.count) = (start, 0);
     }
 
-    /// Starts a round as soon as there is time, because what the history holds is not what was shown.
+    /// Starts a round as soon as there is time, because what the history holds is not what was
+    /// shown.
     pub(super) fn request(&mut self) {
         (self.phase, self.requested) = (Phase::Rest, true);
     }
 
-    /// Replaces the features (standardised) of the block that was remembered last.
-    pub(super) fn amend(&mut self, features: &[f32]) {
+    /// Replaces the features of the block that was remembered last.
+    pub(super) fn amend(&mut self, features: Standardised<&[f32]>) {
         if let Some(last) = self.blocks.checked_sub(1) {
-            let at = self.slot(last) * self.width;
-            self.features[at..][..self.width].copy_from_slice(features);
+            self.keep(last, features);
         }
     }
 
@@ -125,9 +151,9 @@ impl Anchor {
     pub(super) fn share(&self) -> Share {
         match self.phase {
             Phase::Rest => Share::default(),
-            Phase::Encode(_) => Share { encoded: BLOCKS_A_STEP, ..Share::default() },
-            Phase::Refill(..) => Share { passes: PASSES_A_STEP as u64, ..Share::default() },
-            Phase::Decode(_) => Share { decoded: BLOCKS_A_STEP + 1, ..Share::default() },
+            Phase::Encode(_) => Share { encoded: BLOCKS_PER_STEP, ..Share::default() },
+            Phase::Refill(..) => Share { passes: PASSES_PER_STEP as u64, ..Share::default() },
+            Phase::Decode(_) => Share { decoded: BLOCKS_PER_STEP + 1, ..Share::default() },
         }
     }
 
@@ -140,89 +166,105 @@ impl Anchor {
         self.encoder.as_ref().map_or(0, EncoderState::cache_bytes) + self.next.cache_bytes()
     }
 
-    /// Remembers the decoded features (standardised) of a block.
-    pub(super) fn remember(&mut self, features: &[f32]) {
-        let at = self.slot(self.blocks) * self.width;
-        self.features[at..][..self.width].copy_from_slice(features);
+    /// Remembers the decoded features of a block; without any those are due that [`Anchor::amend`]
+    /// brings.
+    pub(super) fn remember(&mut self, features: Option<Standardised<&[f32]>>) {
+        if let Some(features) = features {
+            self.keep(self.blocks, features);
+        }
         self.blocks += 1;
     }
 
-    /// Does a block's share of the work; may cross-fade `features`, which `decoder` made of `latent`, and swap decoders.
-    #[allow(clippy::too_many_arguments, reason = "it reaches back from the end of the data flow to its middle")]
-    pub(super) fn step(
-        &mut self,
-        exec: &mut Exec,
-        engine: &Engine,
-        generator: &mut Generator,
-        decoder: &mut DecoderState,
-        latent: &[f32],
-        features: &mut [f32],
-        root: &Root,
-        time: bool,
-    ) {
+    fn keep(&mut self, block: u64, features: Standardised<&[f32]>) {
+        let at = self.at(block);
+        self.features.part_mut(at..at + 1, self.width).values_mut().copy_from_slice(features.values());
+    }
+
+    /// Does a block's share of the work; may cross-fade the features and swap decoders.
+    pub(super) fn step(&mut self, tools: &mut Tools<'_>, mut moment: Moment<'_>) {
         if self.period == 0 {
             return;
         }
-        if !time {
+        if !moment.time {
             self.phase = Phase::Rest;
-            return self.remember(features);
+            return self.remember(moment.features());
         }
-        // The block that was just made: `latent` is its token's, `features` are its frames.
-        let current = self.blocks;
         match self.phase {
-            Phase::Rest => self.consider(root),
-            Phase::Encode(from) => {
-                let to = current.min(from + BLOCKS_A_STEP);
-                (from..to).for_each(|block| self.encode(exec, engine, block));
-                self.phase = Phase::Encode(to);
-                if to == current {
-                    self.started = self.started.max(current.saturating_sub(self.capacity - 1));
-                    for block in self.started..current {
-                        let at = self.slot(block) * self.latent;
-                        self.z.copy_from_slice(&self.latents[at..][..self.latent]);
-                        engine.latent.standardise_in_place(&mut self.z);
-                        generator.history_mut().replace(block, &self.z);
-                    }
-                    self.phase = Phase::Refill(0, self.started);
-                }
-            }
-            Phase::Refill(mut slot, mut from) => {
-                for _ in 0..PASSES_A_STEP {
-                    if slot >= generator.slot_count() {
-                        break;
-                    }
-                    match generator.rewrite(exec, engine.nets(), slot, self.started, from) {
-                        Some(next) => from = next,
-                        None => (slot, from) = (slot + 1, self.started),
-                    }
-                }
-                self.phase = Phase::Refill(slot, from);
-                if slot >= generator.slot_count() {
-                    // As much past as the decoder sees, and no more than the history is sure to hold.
-                    let window = engine.config.vae.window_blocks.min(engine.config.flow.window_blocks) as u64;
-                    let from = current.saturating_sub(window).max(self.first);
-                    self.next.reset(from);
-                    self.phase = Phase::Decode(from);
-                }
-            }
-            Phase::Decode(from) => {
-                let to = current.min(from + BLOCKS_A_STEP);
-                for block in from..to {
-                    self.z.copy_from_slice(generator.history().z(block));
-                    engine.latent.restore(&mut self.z);
-                    engine.decoder.step(exec, &mut self.next, &self.z, &mut self.scratch);
-                }
-                self.phase = Phase::Decode(to);
-                if to == current {
-                    engine.decoder.step(exec, &mut self.next, latent, &mut self.scratch);
-                    cross_fade(features, &self.scratch);
-                    std::mem::swap(decoder, &mut self.next);
-                    (self.phase, self.count) = (Phase::Rest, self.count + 1);
-                    (self.anchor, self.anchored_at) = (*root, current);
-                }
+            Phase::Rest => self.consider(&moment.root),
+            Phase::Encode(from) => self.encode(tools, &mut moment, from),
+            Phase::Refill(slot, from) => self.refill(tools, &mut moment, slot, from),
+            Phase::Decode(from) => self.decode(tools, &mut moment, from),
+        }
+        self.remember(moment.features());
+    }
+
+    /// Encodes a few blocks from `from` on; when the present is reached, new latents replace the
+    /// old ones.
+    fn encode(&mut self, tools: &mut Tools<'_>, moment: &mut Moment<'_>, from: u64) {
+        let (engine, current) = (tools.engine, self.blocks);
+        let to = current.min(from + BLOCKS_PER_STEP);
+        for block in from..to {
+            let at = self.at(block);
+            let features = self.features.part(at..at + 1, self.width);
+            let latent = self.latents.part_mut(at..at + 1, self.latent);
+            if let Some((encoder, state)) = engine.encoder.as_ref().zip(self.encoder.as_mut()) {
+                encoder.step(tools.exec, &mut tools.work.vae, state, features, latent);
             }
         }
-        self.remember(features);
+        self.phase = Phase::Encode(to);
+        if to == current {
+            self.started = self.started.max(current.saturating_sub(self.capacity - 1));
+            for block in self.started..current {
+                let at = self.at(block);
+                engine.latent.standardise(self.latents.part(at..at + 1, self.latent), self.z.view_mut());
+                moment.generator.replace(block, self.z.view());
+            }
+            self.phase = Phase::Refill(0, self.started);
+        }
+    }
+
+    /// Computes a few passes of slot caches anew, from slot `slot` and token `from` on.
+    fn refill(&mut self, tools: &mut Tools<'_>, moment: &mut Moment<'_>, mut slot: usize, mut from: u64) {
+        let generator = &mut *moment.generator;
+        for _ in 0..PASSES_PER_STEP {
+            if slot >= generator.slot_count() {
+                break;
+            }
+            match generator.rewrite(&mut tools.flow(), slot, Stretch { oldest: self.started, from }) {
+                Some(next) => from = next,
+                None => (slot, from) = (slot + 1, self.started),
+            }
+        }
+        self.phase = Phase::Refill(slot, from);
+        if slot >= generator.slot_count() {
+            // As much past as the decoder sees, and no more than the history is sure to hold.
+            let config = &tools.engine.config;
+            let window = config.vae.window_blocks.min(config.flow.window_blocks) as u64;
+            let from = self.blocks.saturating_sub(window).max(self.first);
+            self.next.reset(from);
+            self.phase = Phase::Decode(from);
+        }
+    }
+
+    /// Decodes a few blocks from `from` on; when the present is reached, the decoder takes over.
+    fn decode(&mut self, tools: &mut Tools<'_>, moment: &mut Moment<'_>, from: u64) {
+        let current = self.blocks;
+        let to = current.min(from + BLOCKS_PER_STEP);
+        let Self { next, scratch, restored, .. } = self;
+        for block in from..to {
+            tools.engine.latent.restore(moment.generator.latent(block), restored.view_mut());
+            tools.decode(Decoding { state: next, z: restored.view(), out: scratch.view_mut() });
+        }
+        self.phase = Phase::Decode(to);
+        if to == current {
+            tools.decode(Decoding { state: next, z: moment.latent, out: scratch.view_mut() });
+            if let Some(features) = &mut moment.features {
+                cross_fade(features.values_mut(), scratch.values());
+            }
+            std::mem::swap(moment.decoder, next);
+            (self.phase, self.count) = (Phase::Rest, self.count + 1);
+            (self.anchor, self.anchored_at) = (moment.root, current);
+        }
     }
 
     fn consider(&mut self, root: &Root) {
@@ -235,21 +277,14 @@ impl Anchor {
         }
     }
 
-    fn encode(&mut self, exec: &mut Exec, engine: &Engine, block: u64) {
-        let slot = self.slot(block);
-        let features = &self.features[slot * self.width..][..self.width];
-        let latent = &mut self.latents[slot * self.latent..][..self.latent];
-        if let Some((encoder, state)) = engine.encoder.as_ref().zip(self.encoder.as_mut()) {
-            encoder.step(exec, state, features, latent);
-        }
-    }
-
-    fn slot(&self, block: u64) -> usize {
+    /// Where a block is remembered.
+    fn at(&self, block: u64) -> usize {
         (block % self.capacity) as usize
     }
 }
 
-/// `from` becomes `from` at its start and `to` at its end, in equal steps a frame; features are linear in the joints.
+/// `from` becomes `from` at its start and `to` at its end, in equal steps per frame; features are
+/// linear in the joints.
 fn cross_fade(from: &mut [f32], to: &[f32]) {
     let width = from.len() / BLOCK_FRAMES;
     for (i, (from, to)) in from.chunks_exact_mut(width).zip(to.chunks_exact(width)).enumerate() {

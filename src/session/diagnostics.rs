@@ -21,7 +21,8 @@ pub enum Anchoring {
     Every(u32),
 }
 
-/// Flow time at which finished blocks enter the reference network (the single-step student brings its own).
+/// Flow time at which finished blocks enter the reference network (the single-step student brings
+/// its own).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum HistoryTime {
     /// As the bundle says.
@@ -46,8 +47,8 @@ pub struct Diagnostics {
     pub anchoring: Anchoring,
     /// Whether borders between blocks are bridged, so that motion goes on as it was going.
     pub bridge: bool,
-    /// Number of the first block, at most 70 million (108 days): the session's time starts at `4 first_block / 30` s, and
-    /// everything that counts goes on from there.
+    /// Number of the first block, at most 70 million (108 days): the session's time starts at `4
+    /// first_block / 30` s, and everything that counts goes on from there.
     pub first_block: u64,
     /// What runs the audio encoder.
     pub audio: AudioBackend,

@@ -1,8 +1,10 @@
 //! From the gaze that is wanted to the value of the gaze channel.
 //!
-//! A wanted score is turned into the channel's value that brings it about, as the bundle was calibrated ([`GazeConfig`]). Gaze that is
-//! left free is not left to the network alone: low noise and guidance draw it to what is most common, which is contact. It gets a
-//! level of the calibration's clips instead, another one every now and then, as one condition among others: no third guidance branch.
+//! A wanted score is turned into the channel's value that brings it about, as the bundle was
+//! calibrated ([`GazeConfig`]). Gaze that is left free is not left to the network alone: low noise
+//! and guidance draw it to what is most common, which is contact. It gets a level of the
+//! calibration's clips instead, another one every now and then, as one condition among others: no
+//! third guidance branch.
 
 use crate::config::GazeConfig;
 use crate::flow::uniform;
@@ -11,11 +13,12 @@ use crate::frame::{BLOCK_FRAMES, FPS, Sampler};
 /// What gaze targets, and their absence, mean to a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum GazeControl {
-    /// Targets are mean gaze scores, and free gaze is drawn from those of recorded conversations, both as the bundle was calibrated;
-    /// [`GazeControl::Channel`] in a bundle that was not.
+    /// Targets are mean gaze scores, and free gaze is drawn from those of recorded conversations,
+    /// both as the bundle was calibrated; [`GazeControl::Channel`] in a bundle that was not.
     #[default]
     Calibrated,
-    /// Targets are values of the network's gaze channel, and free gaze has none. For measuring, and for checks of the maths.
+    /// Targets are values of the network's gaze channel, and free gaze has none. For measuring, and
+    /// for checks of the maths.
     Channel,
     /// As [`GazeControl::Channel`], but targets are not guided towards. For measuring.
     Unguided,
@@ -36,7 +39,8 @@ impl GazeControl {
         target.is_some() && self != Self::Unguided
     }
 
-    /// What the channel holds in block `block` of a session with this seed that is made by `sampler`.
+    /// What the channel holds in block `block` of a session with this seed that is made by
+    /// `sampler`.
     pub(super) fn cue(
         self,
         config: Option<&GazeConfig>,
@@ -58,8 +62,9 @@ impl GazeControl {
     }
 }
 
-/// The level of free gaze in a block: stretches whose borders lie anywhere in the first half of their period, each with a level drawn
-/// from the calibration's quantiles. A function of the block's number, so that it needs no state and replays.
+/// The level of free gaze in a block: stretches whose borders lie anywhere in the first half of
+/// their period, each with a level drawn from the calibration's quantiles. A function of the
+/// block's number, so that it needs no state and replays.
 fn level(config: &GazeConfig, seed: u64, block: u64) -> f32 {
     let periods = block as f64 * BLOCK_FRAMES as f64 / f64::from(FPS) / f64::from(config.seconds);
     let period = periods as u64;
@@ -92,14 +97,14 @@ mod tests {
         let config = config();
         let value = |target, sampler| GazeControl::Calibrated.cue(Some(&config), Some(target), sampler, 0, 7);
         let near = |cue: Option<Cue>, value: f32| cue.is_some_and(|c| (c.value - value).abs() < 1e-6 && c.guided);
-        assert!(near(value(0.3, Sampler::Midpoint(4)), -0.05), "halfway between two points");
+        assert!(near(value(0.3, Sampler::Midpoint4), -0.05), "halfway between two points");
         assert!(near(value(0.5, Sampler::Single), 0.25), "the student has a curve of its own");
-        assert!(near(value(-1.0, Sampler::Midpoint(4)), -0.4) && near(value(1.0, Sampler::Midpoint(2)), 0.7), "ends");
+        assert!(near(value(-1.0, Sampler::Midpoint4), -0.4) && near(value(1.0, Sampler::Midpoint2), 0.7), "ends");
     }
 
     #[test]
     fn without_calibration_targets_are_the_channel() {
-        let cue = |control: GazeControl, config, target| control.cue(config, target, Sampler::Midpoint(4), 0, 0);
+        let cue = |control: GazeControl, config, target| control.cue(config, target, Sampler::Midpoint4, 0, 0);
         assert_eq!(cue(GazeControl::Calibrated, None, Some(0.3)), Some(Cue { value: 0.3, guided: true }));
         assert_eq!(cue(GazeControl::Calibrated, None, None), None);
         let config = config();

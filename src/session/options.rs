@@ -16,8 +16,8 @@ pub struct SessionOptions {
     pub seed: u64,
     /// Threads that compute a block, 1 or 2. The result is the same.
     pub threads: usize,
-    /// Cores that the second thread may run on (bit i: core i); `None` for any. The first thread is the caller's own:
-    /// [`crate::threads::pin_current_thread`].
+    /// Cores that the second thread may run on (bit i: core i); `None` for any. The first thread is
+    /// the caller's own: [`crate::threads::pin_current_thread`].
     pub core_mask: Option<u64>,
     /// Sampler at the start; with a governor, the best one that it uses.
     pub sampler: Sampler,
@@ -29,14 +29,15 @@ pub struct SessionOptions {
     pub guidance: Option<f32>,
     /// Gaze guidance weight, 0 to 20; `None` for the bundle's.
     pub gaze_guidance: Option<f32>,
-    /// Scale of the noise that blocks start from, 0 to 2; `None` for the bundle's. Less gives calmer motion.
+    /// Scale of the noise that blocks start from, 0 to 2; `None` for the bundle's. Less gives
+    /// calmer motion.
     pub temperature: Option<f32>,
     /// Where the agent stands at the start, in the caller's world.
     pub start: Root,
     /// Whether the root's steps are corrected so that planted feet stay where they are.
     pub stance: bool,
-    /// Whether frames that no body could show are replaced by a held pose ([`crate::stats::GuardStats`]); without it a pose
-    /// that is not finite is an error.
+    /// Whether frames that no body could show are replaced by a held pose
+    /// ([`crate::stats::GuardStats`]); without it a pose that is not finite is an error.
     pub guard: bool,
     /// For measurements and tests.
     #[doc(hidden)]
@@ -49,7 +50,7 @@ impl Default for SessionOptions {
             seed: 0,
             threads: 1,
             core_mask: None,
-            sampler: Sampler::Midpoint(4),
+            sampler: Sampler::Midpoint4,
             governor: Governor::Off,
             gaze: None,
             guidance: None,
@@ -79,8 +80,9 @@ impl SessionOptions {
         self.diagnostics.check()?;
         self.governor.check()?;
         match self.sampler {
-            Sampler::Midpoint(1 | 2 | 4) | Sampler::Euler(1..=64) if engine.flow.is_some() => Ok(()),
             Sampler::Single if engine.student.is_some() => Ok(()),
+            Sampler::Single => Err(unsupported(Sampler::Single, engine)),
+            _ if engine.flow.is_some() => Ok(()),
             other => Err(unsupported(other, engine)),
         }
     }
@@ -120,6 +122,13 @@ pub(super) fn check_guidance(weight: f32) -> Result<()> {
     Err(argument(format!("guidance weight {weight}: 0 to 20")))
 }
 
+pub(super) fn check_block_time(milliseconds: f64) -> Result<()> {
+    if milliseconds.is_finite() && milliseconds >= 0.0 {
+        return Ok(());
+    }
+    Err(argument(format!("a block time of {milliseconds} ms: 0 or more")))
+}
+
 pub(super) fn unsupported(sampler: Sampler, engine: &Engine) -> Error {
     argument(match sampler {
         Sampler::Single if engine.student.is_none() && engine.config.student.is_some() => {
@@ -129,13 +138,9 @@ pub(super) fn unsupported(sampler: Sampler, engine: &Engine) -> Error {
             "the single-step sampler needs a bundle with a student network; this one has none (see `visavis inspect`)"
                 .to_owned()
         }
-        Sampler::Midpoint(1 | 2 | 4) | Sampler::Euler(1..=64) if engine.flow.is_none() => {
+        _ if engine.flow.is_none() => {
             format!("{sampler} needs the reference network, which this engine was loaded without: use the single step")
         }
-        Sampler::Single | Sampler::Midpoint(_) => format!("{sampler}: midpoint takes 1, 2 or 4 steps"),
-        Sampler::Euler(n) if (1..=64).contains(&n) => {
-            format!("{sampler}: its flow times have no caches in this session; make a session with that sampler")
-        }
-        Sampler::Euler(_) => format!("{sampler}: Euler takes 1 to 64 steps"),
+        _ => format!("{sampler}: its flow times have no caches in this session; make a session with that sampler"),
     })
 }

@@ -14,8 +14,8 @@ const WINDOW: usize = 4096;
 pub struct SessionStats {
     /// Blocks computed since the start.
     pub blocks: u64,
-    /// Computation time of a block over the last 4096 blocks: p50, p95, p99 and the maximum, milliseconds. Zeros before
-    /// the first block.
+    /// Computation time of a block over the last 4096 blocks: p50, p95, p99 and the maximum,
+    /// milliseconds. Zeros before the first block.
     pub block_ms: [f64; 4],
     /// How old what a block knows is.
     pub delays: Delays,
@@ -34,11 +34,13 @@ pub struct SessionStats {
 /// Added delays, milliseconds, before the computation itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Delays {
-    /// From something the user does or says to the start of the first block that can answer: at most this long.
+    /// From something the user does or says to the start of the first block that can answer: at
+    /// most this long.
     pub user_ms: f64,
     /// The same for the agent's own voice: 0 when it is known ahead.
     pub agent_ms: f64,
-    /// Look-ahead of the resampler of the user's voice, within `user_ms` of sound that is heard later; 0 at 24 kHz.
+    /// Look-ahead of the resampler of the user's voice, within `user_ms` of sound that is heard
+    /// later; 0 at 24 kHz.
     pub user_resampler_ms: f64,
     /// Look-ahead of the resampler of the agent's voice.
     pub agent_resampler_ms: f64,

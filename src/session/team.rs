@@ -1,35 +1,31 @@
 //! Several sessions stepped together: their rows share each pass over the flow network's weights.
 
 use super::Session;
-use super::block::BlockState;
+use super::block::Block;
 use super::governor::{Hold, Plan};
-use super::inputs::listen;
+use super::pipeline::{MEMBERS, compute};
+use super::tools::{Tools, Workspace};
 use crate::engine::Engine;
 use crate::error::{Error, ErrorKind, Result};
-use crate::flow::{SHARED_ROWS, SharedPass};
+use crate::flow::SHARED_ROWS;
 use crate::kernels::Exec;
-use crate::vae::{Decoding, SharedDecoding};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Sessions of one shared pass, at most: two rows each is the least.
-const MEMBERS: usize = SHARED_ROWS / 2;
-
 /// What it takes to step several sessions of one engine together: threads and working memory.
 ///
-/// Reading the weights is most of a block's time. Sessions whose blocks are due at the same time, and made by the same
-/// sampler with history at the same flow times, go through the flow network and the decoder side by side, in the flow
-/// network up to 16 rows a pass: four without a gaze target, two with one, eight on the single-step student. The
-/// others are computed one after the other. What each session shows has the bits that
-/// [`Session::poll`] gives.
+/// Reading the weights is most of a block's time. Sessions whose blocks are due at the same time,
+/// and made by the same sampler with history at the same flow times, go through the flow network
+/// and the decoder side by side, in the flow network up to 16 rows per pass: four without a gaze
+/// target, two with one, eight on the single-step student. The others are computed one after the
+/// other. What each session shows has the bits that [`Session::poll`] gives.
 ///
 /// A team has threads of its own: make the sessions with one thread.
 ///
 /// ```no_run
-/// # fn main() -> visavis::error::Result<()> {
-/// use visavis::engine::Engine;
-/// use visavis::session::SessionOptions;
+/// use visavis::{Engine, SessionOptions};
 ///
+/// # fn main() -> visavis::Result<()> {
 /// let engine = Engine::load("models/visavis-base-i8.safetensors")?;
 /// let mut team = engine.team(2)?;
 /// let mut a = engine.session(SessionOptions { seed: 1, ..SessionOptions::default() })?;
@@ -46,8 +42,7 @@ const MEMBERS: usize = SHARED_ROWS / 2;
 pub struct Team {
     engine: Arc<Engine>,
     exec: Exec,
-    pass: SharedPass,
-    decoder: SharedDecoding,
+    work: Workspace,
     shared: u64,
 }
 
@@ -58,15 +53,11 @@ pub(super) struct Due {
     work: f64,
 }
 
-/// A session and its time.
-type Member<'a, 's> = &'a mut (&'s mut Session, f64);
-
 impl Team {
     pub(crate) fn new(engine: Arc<Engine>, threads: usize) -> Result<Self> {
         let exec = engine.exec(threads)?;
-        let pass = SharedPass::new(engine.nets());
-        let decoder = engine.decoder.shared(MEMBERS);
-        Ok(Self { engine, exec, pass, decoder, shared: 0 })
+        let work = Workspace::new(&engine, MEMBERS);
+        Ok(Self { engine, exec, work, shared: 0 })
     }
 
     /// Blocks so far that shared their passes with another session's.
@@ -74,15 +65,17 @@ impl Team {
         self.shared
     }
 
-    /// Computes the next block of each session that is due at its session time (seconds) and returns how many those were; their
-    /// frames are in [`Session::frames`]. Call it until it returns 0, as [`Session::poll`].
+    /// Computes the next block of each session that is due at its session time (seconds) and
+    /// returns how many those were; their frames are in [`Session::frames`]. Call it until it
+    /// returns 0, as [`Session::poll`].
     ///
-    /// The time that it takes counts for each of them in equal parts ([`Session::stats`], and what a governor goes by).
+    /// The time that it takes counts for each of them in equal parts ([`Session::stats`], and what
+    /// a governor goes by).
     ///
     /// # Errors
-    /// [`ErrorKind::Argument`] for a session of another engine, or a time that is not finite, [`ErrorKind::State`] for a time before an
-    /// earlier one: nothing is computed then. Errors of one session's block, as of [`Session::poll`], come out after the others' blocks are
-    /// done.
+    /// [`ErrorKind::Argument`] for a session of another engine, or a time that is not finite,
+    /// [`ErrorKind::State`] for a time before an earlier one: nothing is computed then. Errors of
+    /// one session's block, as of [`Session::poll`], come out after the others' blocks are done.
     pub fn step(&mut self, sessions: &mut [(&mut Session, f64)]) -> Result<usize> {
         for (session, now) in &*sessions {
             if !Arc::ptr_eq(&session.engine, &self.engine) {
@@ -105,10 +98,12 @@ impl Team {
         let mut outcome = Ok(());
         let started = Instant::now();
         self.exec.begin();
-        while let Some(members) = gather(sessions) {
-            let done = self.block(members);
-            if outcome.is_ok() {
-                outcome = done;
+        let mut tools = Tools { exec: &mut self.exec, work: &mut self.work, engine: &self.engine };
+        while let Some(mut blocks) = gather(sessions) {
+            let count = compute(&mut tools, &mut blocks);
+            self.shared += if count > 1 { count as u64 } else { 0 };
+            for block in blocks.into_iter().flatten() {
+                outcome = outcome.and(block.outcome);
             }
         }
         self.exec.end();
@@ -120,105 +115,38 @@ impl Team {
         }
         outcome.map(|()| due as usize)
     }
-
-    /// One block of each of `members`, which can share passes. Allocates nothing, takes no lock, makes no system call.
-    #[cfg_attr(visavis_rtsan, sanitize(realtime = "nonblocking"))]
-    fn block(&mut self, mut members: [Option<Member<'_, '_>>; MEMBERS]) -> Result<()> {
-        let Self { engine, exec, pass, decoder, shared } = self;
-        let mut outcome = Ok(());
-        let mut keep = |done: Result<()>| {
-            let fine = done.is_ok();
-            if outcome.is_ok() {
-                outcome = done;
-            }
-            fine
-        };
-        let count = members.iter().flatten().count();
-        for (session, _) in members.iter_mut().flatten() {
-            session.done = session.due.take();
-        }
-        if count == 1 {
-            for (session, _) in members.iter_mut().flatten() {
-                let Session { state, options, done: Some(due), .. } = &mut **session else { continue };
-                keep(state.compute(exec, engine, options, &due.plan, None));
-            }
-            return outcome;
-        }
-        let mut ears = [const { [const { None }; 2] }; MEMBERS];
-        for (ears, (session, _)) in ears.iter_mut().zip(members.iter_mut().flatten()) {
-            *ears = session.state.ears();
-        }
-        listen(exec, engine, &mut ears.as_flattened_mut()[..2 * count]);
-        for member in &mut members {
-            let Some((session, _)) = member else { continue };
-            let Session { state, options, done: Some(due), .. } = &mut **session else { continue };
-            if keep(state.prepare(engine, options, &due.plan, &mut None)) {
-                state.begin_shared(engine, options, &due.plan);
-            } else {
-                *member = None;
-            }
-        }
-        pass.sample(exec, engine.nets(), &mut members, |member| &mut member.0.state.generator);
-        *shared += members.iter().flatten().count() as u64;
-        let mut decoding: [Option<Decoding<'_>>; MEMBERS] = [const { None }; MEMBERS];
-        for (decoding, (session, _)) in decoding.iter_mut().zip(members.iter_mut().flatten()) {
-            let Session { state, options, .. } = &mut **session;
-            state.take_latent(engine, options, &mut None);
-            *decoding = Some(state.decoding());
-        }
-        engine.decoder.step_all(exec, decoder, &mut decoding);
-        let mut posing: [Option<Posing<'_>>; MEMBERS] = [const { None }; MEMBERS];
-        for (posing, (session, _)) in posing.iter_mut().zip(members.iter_mut().flatten()) {
-            let Session { state, options, done: Some(due), .. } = &mut **session else { continue };
-            state.decoded(exec, engine, options, &due.plan, &mut None);
-            *posing = Some(Posing { state, plan: &due.plan, done: Ok(()) });
-        }
-        exec.pool_mut().each(&mut posing[..count], |_, posing| {
-            let Some(Posing { state, plan, done }) = posing else { return };
-            *done = state.pose(None, engine);
-            if done.is_ok() {
-                state.present(engine, plan, &mut None);
-            }
-        });
-        for posing in posing.into_iter().flatten() {
-            keep(posing.done);
-        }
-        outcome
-    }
 }
 
-/// A session whose features are to become frames.
-struct Posing<'a> {
-    state: &'a mut BlockState,
-    plan: &'a Plan,
-    done: Result<()>,
-}
-
-/// The first session that is due, and those that can share its passes; `None` when all are done.
-fn gather<'a, 's>(sessions: &'a mut [(&'s mut Session, f64)]) -> Option<[Option<Member<'a, 's>>; MEMBERS]> {
-    let mut members: [Option<Member<'a, 's>>; MEMBERS] = [const { None }; MEMBERS];
+/// The block of the first session that is due, and those of sessions that can share its passes;
+/// `None` when all are done.
+fn gather<'a>(sessions: &'a mut [(&mut Session, f64)]) -> Option<[Option<Block<'a>>; MEMBERS]> {
+    let mut blocks: [Option<Block<'a>>; MEMBERS] = [const { None }; MEMBERS];
     let (mut count, mut left) = (0, 0);
-    for member in sessions {
-        let Some(Due { plan, .. }) = member.0.due else { continue };
-        let rows = member.0.shared_rows(&plan);
-        let Some(first) = &members[0] else {
-            (members[0], count) = (Some(member), 1);
+    for (session, _) in sessions {
+        let Some(Due { plan, .. }) = session.due else { continue };
+        let rows = session.shared_rows(&plan);
+        left = match &blocks[0] {
             // A session that shares with nobody leaves no room.
-            left = SHARED_ROWS.saturating_sub(rows.unwrap_or(SHARED_ROWS));
-            continue;
+            None => SHARED_ROWS.saturating_sub(rows.unwrap_or(SHARED_ROWS)),
+            Some(first) => {
+                let same = first.plan.sampler == plan.sampler
+                    && first.state.generator.alike(&session.state.generator, plan.sampler);
+                match rows.and_then(|rows| left.checked_sub(rows)) {
+                    Some(rest) if same && count < MEMBERS => rest,
+                    _ => continue,
+                }
+            }
         };
-        let same = first.0.due.is_some_and(|due| due.plan.sampler == plan.sampler)
-            && first.0.state.generator.alike(&member.0.state.generator, plan.sampler);
-        if let Some(rows) = rows.filter(|rows| same && *rows <= left && count < MEMBERS) {
-            members[count] = Some(member);
-            (count, left) = (count + 1, left - rows);
-        }
+        session.done = session.due.take();
+        let Session { options, state, .. } = &mut **session;
+        blocks[count] = Some(Block { options, plan, state, probe: None, outcome: Ok(()) });
+        count += 1;
     }
-    (count > 0).then_some(members)
+    (count > 0).then_some(blocks)
 }
 
 impl Session {
-    /// Rows of a shared pass that the block of `plan` takes; `None` where it cannot share one.
+    /// Rows of a pass that the block of `plan` takes; `None` where it cannot share one.
     fn shared_rows(&self, plan: &Plan) -> Option<usize> {
         let rows =
             self.state.generator.rows(plan.sampler, self.options.diagnostics.gaze_control.guides(self.options.gaze))?;

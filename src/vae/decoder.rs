@@ -1,21 +1,24 @@
 //! The decoder: one latent in, four frames of pose features out.
 
-use super::stack::{Stack, StackState, Work};
+use super::stack::{Stack, StackState};
+use super::work::Work;
 use crate::bundle::Tensors;
 use crate::config::VaeConfig;
 use crate::error::Result;
 use crate::frame::BLOCK_FRAMES;
 use crate::kernels::{Epilogue, Exec, Kernels, KvDtype, Matrix};
+use crate::normaliser::{Metric, Standardised};
 
-/// Tokens of a block: the latent and four frame slots.
-const TOKENS: usize = 1 + BLOCK_FRAMES;
+/// Tokens of a block: the latent and one per frame.
+pub(super) const TOKENS: usize = 1 + BLOCK_FRAMES;
 
 /// Weights of the decoder.
 #[derive(Debug)]
 pub struct Decoder {
     stack: Stack,
     latent: Matrix,
-    /// Embeddings of the five tokens before the latent is added: slot, and frame token where there is one.
+    /// Embeddings of the five tokens before the latent is added: slot, and frame token where there
+    /// is one.
     tokens: Vec<f32>,
     out: Matrix,
 }
@@ -24,24 +27,15 @@ pub struct Decoder {
 #[derive(Debug)]
 pub struct DecoderState(StackState);
 
-/// One of several blocks that are decoded together: what [`Decoder::step`] gets.
+/// A block that is decoded.
 #[derive(Debug)]
 pub struct Decoding<'a> {
     /// The state.
     pub state: &'a mut DecoderState,
-    /// The latent.
-    pub z: &'a [f32],
-    /// The features.
-    pub out: &'a mut [f32],
-}
-
-/// Working memory of blocks that are decoded together.
-#[derive(Debug)]
-pub struct SharedDecoding {
-    work: Work,
-    /// The frames' tokens of all.
-    hidden: Vec<f32>,
-    out: Vec<f32>,
+    /// The latent, `[latent]`.
+    pub z: Metric<&'a [f32]>,
+    /// What becomes the features, `[4, features]`.
+    pub out: Standardised<&'a mut [f32]>,
 }
 
 impl Decoder {
@@ -72,54 +66,51 @@ impl Decoder {
         DecoderState(self.stack.state(dtype))
     }
 
-    /// Decodes the next block: `z` is `[latent]`, unstandardised; `out` becomes `[4, features]`, standardised.
-    pub fn step(&self, exec: &mut Exec, state: &mut DecoderState, z: &[f32], out: &mut [f32]) {
-        self.embed(exec, state, z);
-        let hidden = self.stack.step(exec, &mut state.0);
-        exec.linear(&self.out, &hidden[self.width()..], BLOCK_FRAMES, out, Epilogue::Store);
+    /// Working memory to decode up to `blocks` blocks together, or to encode one.
+    pub fn work(&self, blocks: usize) -> Work {
+        let rows = (blocks * TOKENS).max(super::encoder::TOKENS);
+        Work { pass: self.stack.pass(rows), out: vec![0.0; blocks * BLOCK_FRAMES * self.out.out_features()] }
     }
 
-    /// Working memory to decode up to `members` blocks together.
-    pub fn shared(&self, members: usize) -> SharedDecoding {
-        let frames = members * BLOCK_FRAMES;
-        SharedDecoding {
-            work: self.stack.work(members),
-            hidden: vec![0.0; frames * self.width()],
-            out: vec![0.0; frames * self.out.out_features()],
-        }
+    /// Decodes a block.
+    pub fn step(&self, exec: &mut Exec, work: &mut Work, block: Decoding<'_>) {
+        self.step_all(exec, work, &mut [block], |block| Some(block.borrowed()));
     }
 
-    /// Decodes the next block of each of `members`, as [`Decoder::step`] does one, with one pass over the weights.
+    /// Decodes the next block of each of `members` that has one, with one pass over the weights.
     ///
     /// # Panics
-    /// When there are more of them than `shared` is for.
-    pub fn step_all(&self, exec: &mut Exec, shared: &mut SharedDecoding, members: &mut [Option<Decoding<'_>>]) {
-        let (d, features) = (self.width(), self.out.out_features());
-        for member in members.iter_mut().flatten() {
-            self.embed(exec, member.state, member.z);
+    /// When there are more of them than `work` is for.
+    pub fn step_all<M>(
+        &self,
+        exec: &mut Exec,
+        work: &mut Work,
+        members: &mut [M],
+        block: impl for<'a> Fn(&'a mut M) -> Option<Decoding<'a>> + Copy,
+    ) {
+        let Work { pass, out } = work;
+        pass.clear();
+        for Decoding { state, z, .. } in members.iter_mut().filter_map(block) {
+            let x = self.stack.push(&mut state.0, pass);
+            x.copy_from_slice(&self.tokens);
+            exec.linear(&self.latent, z.values(), 1, &mut x[..self.latent.out_features()], Epilogue::Add);
         }
-        let SharedDecoding { work, hidden, out } = shared;
-        let tokens = self.stack.step_all(exec, work, members, |member| &mut member.state.0);
-        for (tokens, hidden) in tokens.chunks_exact(TOKENS * d).zip(hidden.chunks_exact_mut(BLOCK_FRAMES * d)) {
-            hidden.copy_from_slice(&tokens[d..]);
+        if pass.rows() == 0 {
+            return;
         }
-        let frames = tokens.len() / (TOKENS * d) * BLOCK_FRAMES;
-        let out = &mut out[..frames * features];
-        exec.linear(&self.out, &hidden[..frames * d], frames, out, Epilogue::Store);
-        for (member, out) in members.iter_mut().flatten().zip(out.chunks_exact(BLOCK_FRAMES * features)) {
-            member.out.copy_from_slice(out);
+        self.stack.run(exec, pass, members, |member| block(member).map(|block| &mut block.state.0), 1..TOKENS);
+        let features = pass.project(exec, &self.out, out);
+        let blocks = features.chunks_exact(BLOCK_FRAMES * self.out.out_features());
+        for (mut member, features) in members.iter_mut().filter_map(block).zip(blocks) {
+            member.out.values_mut().copy_from_slice(features);
         }
     }
+}
 
-    /// Token embeddings of the next block.
-    fn embed(&self, exec: &mut Exec, state: &mut DecoderState, z: &[f32]) {
-        let x = &mut state.0.work.x;
-        x.copy_from_slice(&self.tokens);
-        exec.linear(&self.latent, z, 1, &mut x[..self.width()], Epilogue::Add);
-    }
-
-    fn width(&self) -> usize {
-        self.latent.out_features()
+impl Decoding<'_> {
+    /// The same for a shorter time.
+    fn borrowed(&mut self) -> Decoding<'_> {
+        Decoding { state: self.state, z: self.z, out: self.out.view_mut() }
     }
 }
 
@@ -129,10 +120,9 @@ impl DecoderState {
         self.0.reset(first);
     }
 
-    /// Takes back the last block, so that the next one takes its place (teacher-forced comparisons).
-    ///
-    /// # Panics
-    /// When there is none.
+    /// Takes back the last block, if there is one, so that the next one takes its place
+    /// (teacher-forced comparisons).
+    #[cfg(feature = "internals")]
     pub fn back(&mut self) {
         self.0.back();
     }

@@ -1,23 +1,27 @@
 //! The encoder: four frames of pose features in, the mean of their latent out.
 //!
-//! A session needs it to start from the idle clip and to re-anchor; the variance serves training alone and is not read.
+//! A session needs it to start from the idle clip and to re-anchor; the variance serves training
+//! alone and is not read.
 
 use super::stack::{Stack, StackState};
+use super::work::Work;
 use crate::bundle::Tensors;
 use crate::config::VaeConfig;
 use crate::error::Result;
 use crate::frame::BLOCK_FRAMES;
 use crate::kernels::{Epilogue, Exec, Kernels, KvDtype, Matrix};
+use crate::normaliser::{Metric, Standardised};
 
 /// Tokens of a block: four frames, `mu` and `sigma`.
-const TOKENS: usize = BLOCK_FRAMES + 2;
+pub(super) const TOKENS: usize = BLOCK_FRAMES + 2;
 
 /// Weights of the encoder.
 #[derive(Debug)]
 pub struct Encoder {
     stack: Stack,
     frame: Matrix,
-    /// Embeddings of the six tokens before the frames are added: slot, and `mu` or `sigma` token where there is one.
+    /// Embeddings of the six tokens before the frames are added: slot, and `mu` or `sigma` token
+    /// where there is one.
     tokens: Vec<f32>,
     mu: Matrix,
 }
@@ -56,13 +60,23 @@ impl Encoder {
         EncoderState(self.stack.state(dtype))
     }
 
-    /// Encodes the next block: `frames` is `[4, features]`, standardised; `mu` becomes `[latent]`, unstandardised.
-    pub fn step(&self, exec: &mut Exec, state: &mut EncoderState, frames: &[f32], mu: &mut [f32]) {
+    /// Encodes the next block: `frames` is `[4, features]`; `mu` becomes the latent, `[latent]`.
+    pub fn step(
+        &self,
+        exec: &mut Exec,
+        work: &mut Work,
+        state: &mut EncoderState,
+        frames: Standardised<&[f32]>,
+        mut mu: Metric<&mut [f32]>,
+    ) {
         let d = self.frame.out_features();
-        state.0.work.x.copy_from_slice(&self.tokens);
-        exec.linear(&self.frame, frames, BLOCK_FRAMES, &mut state.0.work.x[..BLOCK_FRAMES * d], Epilogue::Add);
-        let hidden = self.stack.step(exec, &mut state.0);
-        exec.linear(&self.mu, &hidden[BLOCK_FRAMES * d..][..d], 1, mu, Epilogue::Store);
+        let pass = &mut work.pass;
+        pass.clear();
+        let x = self.stack.push(&mut state.0, pass);
+        x.copy_from_slice(&self.tokens);
+        exec.linear(&self.frame, frames.values(), BLOCK_FRAMES, &mut x[..BLOCK_FRAMES * d], Epilogue::Add);
+        self.stack.run(exec, pass, &mut [&mut state.0], |state| Some(&mut **state), BLOCK_FRAMES..BLOCK_FRAMES + 1);
+        pass.project(exec, &self.mu, mu.values_mut());
     }
 }
 

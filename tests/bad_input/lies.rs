@@ -1,5 +1,5 @@
-//! Bundles whose header or config lies: sound JSON with sizes, shapes, offsets and types that contradict each other or the
-//! file. Each is a typed error, found before memory is taken.
+//! Bundles whose header or config lies: sound JSON with sizes, shapes, offsets and types that
+//! contradict each other or the file. Each is a typed error, found before memory is taken.
 
 use super::bundle::{NAME, Parts, tiny_bytes};
 use proptest::prelude::*;
@@ -131,7 +131,8 @@ fn headers_that_lie_are_refused() {
     }
 }
 
-/// Weights that are finite and far too large: the bundle is sound, what it makes is not, and the guard holds a pose.
+/// Weights that are finite and far too large: the bundle is sound, what it makes is not, and the
+/// guard holds a pose.
 #[test]
 fn weights_that_overflow_are_held() {
     for name in ["flow.final.out.weight", "student.final.out.weight", "vae.decoder.out.weight"] {
@@ -141,7 +142,7 @@ fn weights_that_overflow_are_held() {
         let engine = Engine::from_bytes(parts.bytes(), NAME).expect("finite weights load");
         let mut session = engine.session(SessionOptions::default()).unwrap();
         let student = visavis::Sampler::Single;
-        for sampler in [visavis::Sampler::Midpoint(4), student] {
+        for sampler in [visavis::Sampler::Midpoint4, student] {
             session.set_sampler(sampler).unwrap();
             let broken = name.starts_with("vae") || (name.starts_with("student") == (sampler == student));
             let mut held = 0;

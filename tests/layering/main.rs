@@ -1,4 +1,5 @@
-//! Who may use whom: the rooms of the library from the ground up, and no circles among the files of a room.
+//! Who may use whom: the rooms of the library from the ground up, and no circles among the files of
+//! a room.
 
 mod modules;
 
@@ -6,47 +7,48 @@ use modules::{Modules, circle};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// A room, what it is for, and the rooms that it uses. Each stands above those that it uses, so there is no circle.
-/// Tests in `src/` keep to it as well.
+/// A room, what it is for, and the rooms that it uses. Each stands above those that it uses, so
+/// there is no circle. Tests in `src/` keep to it as well.
 const ROOMS: &[(&str, &str, &[&str])] = &[
     ("error", "the one error type", &[]),
     ("bounded", "reading files, never more than was agreed", &[]),
     ("frame", "what passes between stages and to the caller", &["error"]),
+    ("queue", "records between threads that do not wait", &[]),
     ("scheme", "how weights are stored", &[]),
     ("rig", "the skeleton", &["error", "frame"]),
+    ("normaliser", "the networks' scale and that of metres", &["error"]),
     ("config", "what a bundle says about itself", &["rig", "scheme"]),
     ("par", "two threads", &["error"]),
     ("kernels", "arithmetic", &["error", "par", "scheme"]),
-    ("nn", "a transformer layer", &["kernels"]),
-    ("user", "the user's head", &["frame"]),
-    ("audio", "voices", &["config", "error", "frame", "kernels"]),
-    ("pose", "features to joints and back", &["error", "frame", "kernels", "par", "rig"]),
+    ("nn", "passes through transformer layers", &["kernels"]),
+    ("user", "the user's head", &["frame", "queue"]),
+    ("audio", "voices", &["config", "error", "frame", "kernels", "queue"]),
+    ("pose", "features to joints and back", &["error", "frame", "kernels", "normaliser", "par", "rig"]),
     ("bundle", "the model file", &["audio", "bounded", "config", "error", "frame", "kernels"]),
-    ("vae", "motion to latents and back", &["bundle", "config", "error", "frame", "kernels", "nn"]),
-    ("flow", "noise to latents", &["bundle", "config", "error", "frame", "kernels", "nn"]),
+    ("vae", "motion to latents and back", &["bundle", "config", "error", "frame", "kernels", "nn", "normaliser"]),
+    ("flow", "noise to latents", &["bundle", "config", "error", "frame", "kernels", "nn", "normaliser"]),
     (
         "engine",
         "a loaded bundle",
-        &["audio", "bundle", "config", "error", "flow", "frame", "kernels", "pose", "rig", "vae"],
+        &["audio", "bundle", "config", "error", "flow", "frame", "kernels", "normaliser", "pose", "rig", "vae"],
     ),
     (
         "session",
         "one conversation",
-        &["audio", "config", "engine", "error", "flow", "frame", "kernels", "par", "pose", "user", "vae"],
+        &["audio", "config", "engine", "error", "flow", "frame", "kernels", "normaliser", "par", "pose", "user", "vae"],
     ),
     (
         "quant",
         "smaller bundles",
-        &["audio", "bundle", "config", "engine", "error", "flow", "frame", "kernels", "pose", "vae"],
+        &["bundle", "config", "engine", "error", "frame", "kernels", "normaliser", "pose", "session", "vae"],
     ),
 ];
 
 /// Modules of `src/lib.rs` itself: the front door, which lets names out. No room goes through it.
-const FRONT: &[&str] = &["internals", "openxr", "stats", "threads"];
+const FRONT: &[&str] = &["internals", "openxr", "replay", "stats", "threads"];
 
 /// Circles among the files of a room that are still to be broken up.
-const CIRCLES: &[(&str, &[&str])] =
-    &[("flow", &["sampler", "shared"]), ("kernels", &["exec", "linear"]), ("quant", &["teacher", "walker"])];
+const CIRCLES: &[(&str, &[&str])] = &[("kernels", &["exec", "linear"])];
 
 fn library() -> Modules {
     Modules::read(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/src/lib.rs")))

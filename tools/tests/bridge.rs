@@ -2,6 +2,7 @@
 
 use glam::Quat;
 use visavis::internals::kernels::Kernels;
+use visavis::internals::normaliser::Metric;
 use visavis::internals::pose::synthetic::{self, Noise, Walk};
 use visavis::internals::pose::{Decoder, Encoder, feature_count, root_of};
 use visavis::{BLOCK_FRAMES, Frame};
@@ -50,13 +51,13 @@ fn decoded(walk: &Walk, frames: Option<f32>) -> Vec<Frame> {
     }
     let mut encoder = Encoder::new(RADIUS);
     let width = feature_count(walk.rig.len());
-    let mut x = vec![0.0; BLOCK_FRAMES * width];
+    let mut x = Metric::zeros(BLOCK_FRAMES * width);
     let mut out = walk.frames.clone();
     for block in out.chunks_exact_mut(BLOCK_FRAMES) {
-        for (frame, x) in block.iter().zip(x.chunks_exact_mut(width)) {
-            encoder.encode(frame.root, &frame.global, x);
+        for (i, frame) in block.iter().enumerate() {
+            encoder.encode(frame.root, &frame.global, x.part_mut(i..i + 1, width));
         }
-        decoder.decode_block(&x, block).unwrap();
+        decoder.decode_block(x.view(), block).unwrap();
     }
     out
 }

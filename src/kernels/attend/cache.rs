@@ -26,7 +26,9 @@ pub struct Span {
 
 /// `rings` rings of `capacity` tokens, each a key and a value of `dim` values: `heads` equal parts.
 ///
-/// A head's keys of all tokens of a ring lie one after the other, as do its values, so attention reads streams. A ring keeps the last `capacity` positions written to it; whoever reads a span knows that its tokens are still there.
+/// A head's keys of all tokens of a ring lie one after the other, as do its values, so attention
+/// reads streams. A ring keeps the last `capacity` positions written to it; whoever reads a span
+/// knows that its tokens are still there.
 pub struct KvCache {
     rings: usize,
     pub(crate) capacity: usize,
@@ -63,9 +65,9 @@ impl KvCache {
     /// When the ring does not exist, or `k` or `v` are not `dim` long.
     pub fn write(&mut self, ring: usize, position: u64, k: &[f32], v: &[f32]) {
         assert!(k.len() == self.dim && v.len() == self.dim, "a token's key and value have dim values");
-        let (n, slot) = (self.head_dim(), self.slot(position));
+        let (n, token) = (self.head_dim(), self.index(position));
         for (head, (k, v)) in k.chunks_exact(n).zip(v.chunks_exact(n)).enumerate() {
-            let at = self.head(ring, head) + slot * n;
+            let at = self.offset(ring, head) + token * n;
             match &mut self.store {
                 Store::F16(keys, values) => {
                     keys.of_mut::<f16>()[at..at + n].convert_from_f32_slice(k);
@@ -84,9 +86,9 @@ impl KvCache {
     /// # Panics
     /// When a ring does not exist.
     pub fn copy_token(&mut self, from_ring: usize, to_ring: usize, position: u64) {
-        let (n, slot) = (self.head_dim(), self.slot(position));
+        let (n, token) = (self.head_dim(), self.index(position));
         for head in 0..self.heads {
-            self.copy(self.head(from_ring, head) + slot * n, self.head(to_ring, head) + slot * n, n);
+            self.copy(self.offset(from_ring, head) + token * n, self.offset(to_ring, head) + token * n, n);
         }
     }
 
@@ -95,7 +97,7 @@ impl KvCache {
     /// # Panics
     /// When a ring does not exist.
     pub fn copy_ring(&mut self, from_ring: usize, to_ring: usize) {
-        self.copy(self.head(from_ring, 0), self.head(to_ring, 0), self.capacity * self.dim);
+        self.copy(self.offset(from_ring, 0), self.offset(to_ring, 0), self.capacity * self.dim);
     }
 
     fn copy(&mut self, from: usize, to: usize, n: usize) {
@@ -140,13 +142,13 @@ impl KvCache {
     }
 
     /// First value of a head in a ring; its tokens follow.
-    pub(crate) fn head(&self, ring: usize, head: usize) -> usize {
+    pub(crate) fn offset(&self, ring: usize, head: usize) -> usize {
         assert!(ring < self.rings, "the cache has {} rings", self.rings);
         (ring * self.heads + head) * self.capacity * self.head_dim()
     }
 
-    /// Row of `position` in its ring.
-    pub(crate) fn slot(&self, position: u64) -> usize {
+    /// Which of its ring's tokens has `position`.
+    pub(crate) fn index(&self, position: u64) -> usize {
         (position % self.capacity as u64) as usize
     }
 }

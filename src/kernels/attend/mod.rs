@@ -1,34 +1,47 @@
-//! Attention of one query head of a group of rows, each over its span of one ring of the key and value cache.
+//! Attention of one query head of a batch of rows, each over its span of one ring of the key and
+//! value cache.
 //!
-//! y = sum_t softmax_t(q . k_t / sqrt(head_dim)) v_t. Each dot product runs in 16 lanes; tokens go in chunks of
-//! [`CHUNK`] with a running maximum and sum (Milakov and Gimelshein 2018, "Online normalizer calculation for softmax"),
-//! so that no scratch grows with the span. An empty span gives zeros.
+//! y = sum_t softmax_t(q . k_t / sqrt(head_dim)) v_t. Each dot product runs in 16 lanes; tokens go
+//! in chunks of [`CHUNK`] with a running maximum and sum (Milakov and Gimelshein 2018, "Online
+//! normalizer calculation for softmax"), so that no scratch grows with the span. An empty span
+//! gives zeros.
 
 use half::f16;
 
-use super::{Level, Variant};
+use super::operation::operation;
 
-#[cfg(target_arch = "x86_64")]
-mod avx2;
-#[cfg(target_arch = "x86_64")]
-mod avx512;
+mod batch;
 mod cache;
-#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
-mod group;
-#[cfg(target_arch = "aarch64")]
-mod neon;
 mod scalar;
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
-mod sixteen;
+mod simd;
+#[cfg(test)]
+mod tests;
 
+pub(super) use batch::{MAX_SPANS, batches};
 pub(crate) use cache::Store;
 pub use cache::{KvCache, KvDtype, Span};
+
+operation! {
+    /// Attention of one head for the rows of a batch, at most [`MAX_BATCH`]; the head's keys and
+    /// values, and the rows' queries, are what [`Head::check`] accepts.
+    Attend = "attend", (fn(head: HeadOf<'_>, rows: &mut [Row<'_>]));
+    (Scalar => scalar::run)
+    (Neon, Avx2, Avx512 => simd::run, token)
+}
 
 /// Tokens between two updates of the running maximum.
 pub(crate) const CHUNK: usize = 64;
 
 /// Rows of one kernel call, at most: those of a decoder's block, one and its four tokens.
-pub(crate) const MAX_GROUP: usize = 5;
+pub(crate) const MAX_BATCH: usize = 5;
+
+/// A head's keys and values as the cache stores them.
+#[derive(Clone, Copy)]
+pub(crate) enum HeadOf<'a> {
+    F16(Head<'a, f16>),
+    F32(Head<'a, f32>),
+}
 
 /// Keys and values of one ring, seen by one head: `capacity` of `dim` values each.
 #[derive(Clone, Copy)]
@@ -39,26 +52,26 @@ pub(crate) struct Head<'a, T> {
     pub(crate) capacity: usize,
 }
 
-/// One row of a group: its query and result, `dim` values each, and the tokens that it sees.
+/// One row of a batch: its query and result, `dim` values each, and the tokens that it sees.
 pub(crate) struct Row<'a> {
     pub(crate) q: &'a [f32],
     pub(crate) y: &'a mut [f32],
-    /// Where the first token lies; the others follow, going on at 0 after the last.
-    pub(crate) slot: usize,
+    /// Which of the ring's tokens is the first; the others follow, going on at 0 after the last.
+    pub(crate) first: usize,
     /// Tokens, at most `capacity`.
     pub(crate) len: usize,
-    /// Tokens from the first that any row of the group sees to this row's first.
+    /// Tokens from the first that any row of the batch sees to this row's first.
     pub(crate) shift: usize,
 }
 
 impl<T> Head<'_, T> {
     /// What every variant relies on.
     pub(crate) fn check(&self, rows: &[Row<'_>]) {
-        assert!((1..=MAX_GROUP).contains(&rows.len()), "attend: a group of rows");
+        assert!((1..=MAX_BATCH).contains(&rows.len()), "attend: a batch of rows");
         for row in rows {
             assert!(row.q.len() == self.dim && row.y.len() == self.dim, "attend: q and y are one head each");
             assert!(
-                row.len <= self.capacity && (row.len == 0 || row.slot < self.capacity),
+                row.len <= self.capacity && (row.len == 0 || row.first < self.capacity),
                 "attend: span fits the ring"
             );
         }
@@ -66,30 +79,11 @@ impl<T> Head<'_, T> {
         assert!(self.dim > 0 && self.k.len() >= n && self.v.len() >= n, "attend: tokens exist");
     }
 
-    /// Start of the head's values of the group's token `t`, which `row` sees.
+    /// Start of the head's values of the batch's token `t`, which `row` sees.
     #[inline(always)]
     pub(crate) fn at(&self, row: &Row<'_>, t: usize) -> usize {
-        let slot = row.slot + (t - row.shift);
-        let slot = if slot >= self.capacity { slot - self.capacity } else { slot };
-        slot * self.dim
+        let token = row.first + (t - row.shift);
+        let token = if token >= self.capacity { token - self.capacity } else { token };
+        token * self.dim
     }
 }
-
-/// One variant: entries for both storages, unsafe to call on a CPU without its level.
-pub(crate) struct Kernel {
-    pub(crate) f16: unsafe fn(&Head<'_, f16>, &mut [Row<'_>]),
-    pub(crate) f32: unsafe fn(&Head<'_, f32>, &mut [Row<'_>]),
-}
-
-pub(crate) static VARIANTS: &[Variant<Kernel>] = &[
-    Variant { name: "scalar", level: Level::Scalar, run: Kernel { f16: scalar::f16, f32: scalar::f32 } },
-    #[cfg(target_arch = "x86_64")]
-    Variant { name: "avx2", level: Level::Avx2, run: Kernel { f16: avx2::f16, f32: avx2::f32 } },
-    #[cfg(target_arch = "x86_64")]
-    Variant { name: "avx512", level: Level::Avx512, run: Kernel { f16: avx512::f16, f32: avx512::f32 } },
-    #[cfg(target_arch = "aarch64")]
-    Variant { name: "neon", level: Level::Neon, run: Kernel { f16: neon::f16, f32: neon::f32 } },
-];
-
-#[cfg(test)]
-mod tests;

@@ -1,20 +1,24 @@
-//! The reference: one row after the other, chunk by chunk; variants keep its order of sums, and run it for heads that are no multiple of 16 wide.
+//! The reference: one row after the other, chunk by chunk; variants keep its order of sums, and run
+//! it for heads that are no multiple of 16 wide.
 
-use super::{CHUNK, Head, Row};
+use super::{CHUNK, Head, HeadOf, Row};
+use crate::kernels::f32x16::Stored;
 use crate::kernels::math::{LANES, exp, fold};
 
-pub(super) fn f16(head: &Head<'_, half::f16>, rows: &mut [Row<'_>]) {
-    head.check(rows);
-    rows.iter_mut().for_each(|r| row(head, r, half::f16::to_f32_const));
+pub(super) fn run(head: HeadOf<'_>, rows: &mut [Row<'_>]) {
+    match head {
+        HeadOf::F16(head) => each(&head, rows),
+        HeadOf::F32(head) => each(&head, rows),
+    }
 }
 
-pub(super) fn f32(head: &Head<'_, f32>, rows: &mut [Row<'_>]) {
+fn each<T: Stored>(head: &Head<'_, T>, rows: &mut [Row<'_>]) {
     head.check(rows);
-    rows.iter_mut().for_each(|r| row(head, r, |v| v));
+    rows.iter_mut().for_each(|r| row(head, r));
 }
 
 #[inline(always)]
-pub(super) fn row<T: Copy>(head: &Head<'_, T>, row: &mut Row<'_>, to_f32: impl Fn(T) -> f32 + Copy) {
+pub(super) fn row<T: Stored>(head: &Head<'_, T>, row: &mut Row<'_>) {
     let n = head.dim;
     let scale = 1.0 / (n as f32).sqrt();
     row.y.fill(0.0);
@@ -23,9 +27,9 @@ pub(super) fn row<T: Copy>(head: &Head<'_, T>, row: &mut Row<'_>, to_f32: impl F
         let tokens = CHUNK.min(row.len - start);
         let mut p = [0.0f32; CHUNK];
         for (t, p) in p[..tokens].iter_mut().enumerate() {
-            *p = dot(row.q, &head.k[head.at(row, row.shift + start + t)..][..n], to_f32) * scale;
+            *p = dot(row.q, &head.k[head.at(row, row.shift + start + t)..][..n]) * scale;
         }
-        let (keep, new_top) = soften(&mut p, tokens, top);
+        let (keep, new_top) = online_softmax(&mut p, tokens, top);
         total = total.mul_add(keep, fold_chunk(&p));
         top = new_top;
         if start > 0 {
@@ -34,7 +38,7 @@ pub(super) fn row<T: Copy>(head: &Head<'_, T>, row: &mut Row<'_>, to_f32: impl F
         for (t, p) in p[..tokens].iter().enumerate() {
             let v = &head.v[head.at(row, row.shift + start + t)..][..n];
             for (y, v) in row.y.iter_mut().zip(v) {
-                *y = p.mul_add(to_f32(*v), *y);
+                *y = p.mul_add(v.to_f32(), *y);
             }
         }
     }
@@ -45,23 +49,25 @@ pub(super) fn row<T: Copy>(head: &Head<'_, T>, row: &mut Row<'_>, to_f32: impl F
 }
 
 #[inline(always)]
-fn dot<T: Copy>(q: &[f32], k: &[T], to_f32: impl Fn(T) -> f32) -> f32 {
+fn dot<T: Stored>(q: &[f32], k: &[T]) -> f32 {
     let mut acc = [0.0f32; LANES];
     let ((q, q_tail), (k, k_tail)) = (q.as_chunks::<LANES>(), k.as_chunks::<LANES>());
     for (q, k) in q.iter().zip(k) {
         for l in 0..LANES {
-            acc[l] = q[l].mul_add(to_f32(k[l]), acc[l]);
+            acc[l] = q[l].mul_add(k[l].to_f32(), acc[l]);
         }
     }
     for (l, (q, k)) in q_tail.iter().zip(k_tail).enumerate() {
-        acc[l] = q.mul_add(to_f32(*k), acc[l]);
+        acc[l] = q.mul_add(k.to_f32(), acc[l]);
     }
     fold(acc)
 }
 
-/// Scores to weights relative to the new maximum, zeros past `tokens`; also what weights of the old maximum are to be multiplied by.
+/// One step of the online softmax: the scores of `tokens` of a chunk to weights relative to the new
+/// maximum, zeros behind them. Returns what weights relative to the old maximum, `top`, are to be
+/// multiplied by, and the new one.
 #[inline(always)]
-pub(super) fn soften(p: &mut [f32; CHUNK], tokens: usize, top: f32) -> (f32, f32) {
+pub(super) fn online_softmax(p: &mut [f32; CHUNK], tokens: usize, top: f32) -> (f32, f32) {
     let larger = |m: f32, s: f32| if s > m { s } else { m };
     p[tokens..].fill(f32::NEG_INFINITY);
     let mut tops = [top; LANES];

@@ -1,33 +1,41 @@
-//! What follows a product: scaling, bias, and the activation or the addition to the residual stream.
+//! What follows a product: scaling, bias, and the activation or the addition to the residual
+//! stream.
 //!
-//! For each column c: t = sum\[c\] (i32 sums: converted, times `x_scale * w_scale[c]`; f32 sums: times `x_scale`), t += bias\[c\],
-//! then y\[c\] = t, gelu(t), y\[c\] + t, or fma(gate\[c\], t, y\[c\]).
+//! For each column c: t = sum\[c\] x_scale, or sum\[c\] (x_scale w_scale\[c\]) of integer sums,
+//! converted; t += bias\[c\]; then y\[c\] = t, gelu(t), y\[c\] + t, or fma(gate\[c\], t, y\[c\]).
 //!
-//! Rows that were [split](super::split_rows) have two sums, and `254 high[c] + low[c]`, both as floats, stands for `sum[c]`.
+//! Rows that were [split](super::split_rows) have two sums, and `254 high[c] + low[c]`, both as
+//! floats, stands for `sum[c]`.
 
-use super::{Level, Variant};
+use super::operation::operation;
+use super::packed::{TILE_COLS, Tile};
 
-#[cfg(target_arch = "x86_64")]
-mod avx2;
-#[cfg(target_arch = "x86_64")]
-mod avx512;
-#[cfg(target_arch = "aarch64")]
-mod neon;
 mod scalar;
+#[cfg(test)]
+mod tests;
 
-/// One row of sums.
+/// The sums of one row, or of the high and the low one that it was split into.
+#[derive(Clone, Copy)]
+pub(crate) enum RowSums<'a, T> {
+    Whole(&'a [T]),
+    Split([&'a [T]; 2]),
+}
+
+impl<'a, T> RowSums<'a, T> {
+    /// Those of row `r` in a tile, which has two rows for each that is split.
+    pub(crate) fn of(tile: &'a Tile<T>, r: usize, split: bool) -> Self {
+        let row = |r: usize| -> &[T; TILE_COLS] { &tile[r] };
+        if split { Self::Split([row(2 * r), row(2 * r + 1)]) } else { Self::Whole(row(r)) }
+    }
+}
+
+/// One row of sums and what they are multiplied by.
 #[derive(Clone, Copy)]
 pub(crate) enum Sums<'a> {
-    /// Float sums; exact as they are.
-    F32(&'a [f32]),
-    /// Float sums of quantised activations, times the row's scale.
-    Scaled(&'a [f32], f32),
-    /// Integer sums, the row's scale, and the scale of each column.
-    I32(&'a [i32], f32, &'a [f32]),
-    /// As `Scaled`, of a split row: the high sums and the low ones.
-    ScaledPair([&'a [f32]; 2], f32),
-    /// As `I32`, of a split row.
-    I32Pair([&'a [i32]; 2], f32, &'a [f32]),
+    /// Float sums, and the scale of the row: 1 where activations were not quantised.
+    F32(RowSums<'a, f32>, f32),
+    /// Integer sums, the scale of the row, and the scale of each column.
+    I32(RowSums<'a, i32>, f32, &'a [f32]),
 }
 
 /// What to do with each finished value.
@@ -39,18 +47,9 @@ pub(crate) enum Finish<'a> {
     GatedAdd(&'a [f32]),
 }
 
-/// Finishes one row: as many columns as `y` has; all slices have at least that many values.
-pub(crate) type Run = unsafe fn(Sums<'_>, bias: &[f32], Finish<'_>, y: &mut [f32]);
-
-pub(crate) static VARIANTS: &[Variant<Run>] = &[
-    Variant { name: "scalar", level: Level::Scalar, run: scalar::run },
-    #[cfg(target_arch = "x86_64")]
-    Variant { name: "avx2", level: Level::Avx2, run: avx2::run },
-    #[cfg(target_arch = "x86_64")]
-    Variant { name: "avx512", level: Level::Avx512, run: avx512::run },
-    #[cfg(target_arch = "aarch64")]
-    Variant { name: "neon", level: Level::Neon, run: neon::run },
-];
-
-#[cfg(test)]
-mod tests;
+operation! {
+    /// Finishes one row of one tile: as many columns as `y` has; all slices have at least that many
+    /// values.
+    FinishRow = "epilogue", (fn(sums: Sums<'_>, bias: &[f32], finish: Finish<'_>, y: &mut [f32]));
+    (Scalar, Neon, Avx2, Avx512 => scalar::run)
+}

@@ -1,27 +1,22 @@
-//! The reference: 16 outputs in lanes, column by column of all segments.
+//! The reference, for any weight type: 16 outputs in lanes, column by column of all segments.
 
 use super::{FloatGeometry, Job, Tile};
+use crate::kernels::f32x16::Stored;
 use crate::kernels::packed::{NR, SEGMENTS};
 
-pub(super) fn run(job: &Job<'_, f32>, tile: &mut Tile<f32>) {
+pub(crate) fn run<W: Stored>(job: &Job<'_, W>, tile: &mut Tile<f32>) {
     job.check();
-    body(job, tile, |w| w);
-}
-
-/// The reference, for any weight type.
-#[inline(always)]
-pub(crate) fn body<W: Copy>(job: &Job<'_, W>, tile: &mut Tile<f32>, to_f32: impl Fn(W) -> f32) {
     let FloatGeometry { seg, seg_stride, panel } = job.geo;
     for r in 0..job.rows {
         let x = &job.x[r * job.stride..][..job.geo.padded()];
-        for p in 0..job.panels {
-            let w = &job.weights[(job.first + p) * panel..][..panel];
+        for p in 0..job.panels.count {
+            let w = &job.weights[(job.panels.first + p) * panel..][..panel];
             let mut acc = [0.0f32; NR];
             for k in 0..seg {
                 for s in 0..SEGMENTS {
                     let (x, w) = (x[s * seg + k], &w[s * seg_stride + k * NR..][..NR]);
                     for l in 0..NR {
-                        acc[l] = x.mul_add(to_f32(w[l]), acc[l]);
+                        acc[l] = x.mul_add(w[l].to_f32(), acc[l]);
                     }
                 }
             }

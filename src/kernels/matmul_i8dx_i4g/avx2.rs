@@ -1,10 +1,11 @@
-//! AVX2: `vpmaddubsw` of nibbles cannot saturate: the eight products of a lane's i16, each pair at most 2 * 15 * 127, add up to at
-//! most 30,480. So a whole group is summed in i16 and widened once. Float sums stay in the tile, which leaves the registers to
-//! a group's accumulators.
+//! AVX2: `vpmaddubsw` of nibbles cannot saturate: the eight products of a lane's i16, each pair at
+//! most 2 * 15 * 127, add up to at most 30,480. So a whole group is summed in i16 and widened once.
+//! Float sums stay in the tile, which leaves the registers to a group's accumulators.
 
 use std::arch::x86_64::*;
 
 use super::{GROUP, Geometry, Job, NR, Tile};
+use crate::kernels::packed::{for_rows, portions};
 
 /// Bytes ahead of each panel that are asked for.
 const AHEAD: usize = 1024;
@@ -19,8 +20,8 @@ pub(super) fn run(job: &Job<'_>, tile: &mut Tile<f32>) {
     );
 }
 
-/// The product on 256 bits: `dot` adds products of 32 nibbles and bytes to an accumulator that starts at zero, and `widen` turns it
-/// into 8 sums.
+/// The product on 256 bits: `dot` adds products of 32 nibbles and bytes to an accumulator that
+/// starts at zero, and `widen` turns it into 8 sums.
 #[target_feature(enable = "avx2,fma,f16c")]
 pub(super) fn run_with(
     job: &Job<'_>,
@@ -29,17 +30,9 @@ pub(super) fn run_with(
     widen: impl Fn(__m256i) -> __m256i + Copy,
 ) {
     job.check();
-    for r in (0..job.rows).step_by(8) {
-        match job.rows - r {
-            1 => rows::<1>(job, r, tile, dot, widen),
-            2 => rows::<2>(job, r, tile, dot, widen),
-            3 => rows::<3>(job, r, tile, dot, widen),
-            4 => rows::<4>(job, r, tile, dot, widen),
-            5 => rows::<5>(job, r, tile, dot, widen),
-            6 => rows::<6>(job, r, tile, dot, widen),
-            7 => rows::<7>(job, r, tile, dot, widen),
-            _ => rows::<8>(job, r, tile, dot, widen),
-        }
+    for portion in portions(0..job.x.rows, 8) {
+        let r = portion.start;
+        for_rows!(portion.len(), R in [1 2 3 4 5 6 7 8] => rows::<R>(job, r, tile, dot, widen));
     }
 }
 
@@ -52,25 +45,26 @@ fn rows<const R: usize>(
     dot: impl Fn(__m256i, __m256i, __m256i) -> __m256i + Copy,
     widen: impl Fn(__m256i) -> __m256i + Copy,
 ) {
-    let (groups, panel, stride) = (job.geo.groups, job.geo.panel, job.stride);
-    let start = job.first * panel;
-    let weights = job.weights[start..][..job.panels * panel].as_ptr();
-    let scales = job.scales[start / 2..][..job.panels * panel / 2].as_ptr();
-    let q = job.q[row * stride..][..R * stride].as_ptr();
-    let sums = &job.sums[row * groups..][..R * groups];
+    let (groups, panel, stride) = (job.geo.groups, job.geo.panel, job.x.stride);
+    let start = job.panels.first * panel;
+    let weights = job.weights[start..][..job.panels.count * panel].as_ptr();
+    let scales = job.scales[start / 2..][..job.panels.count * panel / 2].as_ptr();
+    let q = job.x.q[row * stride..][..R * stride].as_ptr();
+    let sums = &job.x.sums[row * groups..][..R * groups];
     let low = _mm256_set1_epi8(15);
     let tile = &mut tile[row..row + R];
     for row in &mut *tile {
-        row[..job.panels * NR].fill(0.0);
+        row[..job.panels.count * NR].fill(0.0);
     }
     for g in 0..groups {
         let offset: [i32; R] = std::array::from_fn(|r| -8 * sums[r * groups + g]);
         // Halves of panels: 8 lanes each.
-        for half in 0..2 * job.panels {
+        for half in 0..2 * job.panels.count {
             let (c, h) = (half / 2, half % 2);
             let mut acc = [_mm256_setzero_si256(); R];
             for j in 0..GROUP / 8 {
-                // SAFETY: half h of line j of group g of panel c, within the slice; a prefetch may point anywhere.
+                // SAFETY: half h of line j of group g of panel c, within the slice; a prefetch may
+                // point anywhere.
                 let w = unsafe {
                     let line = weights.add(c * panel + Geometry::nibbles(g) + j * 64 + h * 32);
                     _mm_prefetch::<_MM_HINT_T0>(line.cast::<i8>().wrapping_add(AHEAD));

@@ -1,61 +1,44 @@
-//! Nibbles are unsigned, as `vpdpbusd` wants them; accumulators of a group start at -8 sum q, which takes off their offset.
-//! Float sums stay in registers: four panels of up to 4 rows, two of up to 6.
+//! Nibbles are unsigned, as `vpdpbusd` wants them; accumulators of a group start at -8 sum q, which
+//! takes off their offset. Float sums stay in registers: four panels of up to 4 rows, two of up to
+//! 6.
 
 use std::arch::x86_64::*;
 
-use super::{GROUP, Geometry, Job, NR, Onward, Tile};
+use super::{GROUP, Geometry, Job, NR, Tile};
+use crate::kernels::packed::{PrefetchTarget, for_blocks, portions};
 
-/// Bytes ahead of each panel that are asked for; at its end, those of the panel that this thread reads next. These panels are asked for
-/// too, all the way, into the second-level cache: four panels alone are too few streams for the memory.
+/// Bytes ahead of each panel that are asked for; at its end, those of the panel that this thread
+/// reads next. These panels are asked for too, all the way, into the second-level cache: four
+/// panels alone are too few streams for the memory.
 const AHEAD: usize = 1024;
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
 pub(super) fn run(job: &Job<'_>, tile: &mut Tile<f32>) {
     job.check();
-    // Even portions of at most 6 rows.
-    let portion = job.rows.div_ceil(job.rows.div_ceil(6));
-    for r in (0..job.rows).step_by(portion) {
-        match portion.min(job.rows - r) {
-            1 => rows::<1>(job, r, tile),
-            2 => rows::<2>(job, r, tile),
-            3 => rows::<3>(job, r, tile),
-            4 => rows::<4>(job, r, tile),
-            5 => rows::<5>(job, r, tile),
-            _ => rows::<6>(job, r, tile),
-        }
-    }
-}
-
-/// Rows `row .. row + R` of the job, as many panels at once as there are registers for.
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
-fn rows<const R: usize>(job: &Job<'_>, row: usize, tile: &mut Tile<f32>) {
-    let mut p = 0;
-    while R <= 4 && p + 4 <= job.panels {
-        block::<R, 4>(job, row, p, tile);
-        p += 4;
-    }
-    while p + 2 <= job.panels {
-        block::<R, 2>(job, row, p, tile);
-        p += 2;
-    }
-    if p < job.panels {
-        block::<R, 1>(job, row, p, tile);
+    // All panels of a portion before the next: what was asked for ahead is then in the cache.
+    for rows in portions(0..job.x.rows, 6) {
+        for_blocks!(rows, job.panels.count, 16, R in [1 2 3 4 5 6], P in [4 2 1], |r, p| block::<R, P>(job, r, p, tile));
     }
 }
 
 /// Rows from `row`, panels from `p` of the job.
+#[inline(never)]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
 fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<f32>) {
-    let (groups, panel, stride) = (job.geo.groups, job.geo.panel, job.stride);
-    let start = (job.first + p) * panel;
+    let (groups, panel, stride) = (job.geo.groups, job.geo.panel, job.x.stride);
+    let start = (job.panels.first + p) * panel;
     let weights = job.weights[start..][..P * panel].as_ptr();
     let scales = job.scales[start / 2..][..P * panel / 2].as_ptr();
-    let q = job.q[row * stride..][..R * stride].as_ptr();
-    let sums = &job.sums[row * groups..][..R * groups];
+    let q = job.x.q[row * stride..][..R * stride].as_ptr();
+    let sums = &job.x.sums[row * groups..][..R * groups];
     let low = _mm512_set1_epi8(15);
     // The next panels of this tile, or those of the next tile.
-    let next = if p + P < job.panels { Onward::new(job.weights, start + P * panel, panel) } else { job.next };
-    let own = Onward::new(job.weights, start, panel);
+    let next = if p + P < job.panels.count {
+        PrefetchTarget::new(job.weights, start + P * panel, panel)
+    } else {
+        job.panels.next
+    };
+    let own = PrefetchTarget::new(job.weights, start, panel);
     let mut total = [[_mm512_setzero_ps(); P]; R];
     for g in 0..groups {
         let at = Geometry::nibbles(g);
@@ -65,7 +48,8 @@ fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, ti
         for c in 0..P {
             let mut acc: [__m512i; R] = start.map(|s| _mm512_set1_epi32(s));
             for j in 0..GROUP / 8 {
-                // SAFETY: line j of group g of panel c, within the slice; a prefetch may point anywhere.
+                // SAFETY: line j of group g of panel c, within the slice; a prefetch may point
+                // anywhere.
                 let w = unsafe {
                     _mm_prefetch::<_MM_HINT_T0>(far.byte(c, line + j as isize * 64).cast());
                     _mm_prefetch::<_MM_HINT_T1>(next.byte(c, (at + j * 64) as isize).cast());

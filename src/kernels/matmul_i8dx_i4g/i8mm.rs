@@ -1,35 +1,33 @@
-//! `smmla`: two rows of eight activations times two outputs of eight weights. A line's low and high nibbles hold columns 0 to 3 and 4 to 7
-//! of four outputs; interleaved by quads they are what the instruction wants. An odd last row is paired with itself.
+//! `smmla`: two rows of eight activations times two outputs of eight weights. A line's low and high
+//! nibbles hold columns 0 to 3 and 4 to 7 of four outputs; interleaved by quads they are what the
+//! instruction wants. An odd last row is paired with itself.
 
 use std::arch::aarch64::*;
 
 use super::{GROUP, Geometry, Job, NR, Tile};
 use crate::kernels::matmul_i8dx_i8cx::i8mm::smmla;
+use crate::kernels::packed::for_blocks;
 
 #[target_feature(enable = "neon,i8mm")]
 pub(super) fn run(job: &Job<'_>, tile: &mut Tile<f32>) {
     job.check();
-    for p in 0..job.panels {
-        for r in (0..job.rows).step_by(4) {
-            match job.rows - r {
-                1 | 2 => block::<1>(job, r, p, tile),
-                _ => block::<2>(job, r, p, tile),
-            }
-        }
-    }
+    for_blocks!(
+        0..job.x.rows.div_ceil(2), job.panels.count, 2, PAIRS in [1 2], P in [1],
+        |pair, p| block::<PAIRS>(job, 2 * pair, p, tile)
+    );
 }
 
 /// `PAIRS` pairs of rows from `row`, panel `p` of the job.
 #[target_feature(enable = "neon,i8mm")]
 fn block<const PAIRS: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<f32>) {
     let (groups, panel) = (job.geo.groups, job.geo.panel);
-    let start = (job.first + p) * panel;
+    let start = (job.panels.first + p) * panel;
     let weights = job.weights[start..][..panel].as_ptr();
     let scales = job.scales[start / 2..][..panel / 2].as_ptr().cast::<u16>();
-    let last = job.rows - 1;
+    let last = job.x.rows - 1;
     let index: [[usize; 2]; PAIRS] = std::array::from_fn(|i| [0, 1].map(|j| last.min(row + 2 * i + j)));
-    let rows = index.map(|pair| pair.map(|r| job.q[r * job.stride..][..job.geo.padded()].as_ptr()));
-    let sums = index.map(|pair| pair.map(|r| &job.sums[r * groups..][..groups]));
+    let rows = index.map(|pair| pair.map(|r| job.x.q[r * job.x.stride..][..job.geo.padded()].as_ptr()));
+    let sums = index.map(|pair| pair.map(|r| &job.x.sums[r * groups..][..groups]));
     let mut total = [[[vdupq_n_f32(0.0); 4]; 2]; PAIRS];
     for g in 0..groups {
         // Of each pair of rows, eight columns at a time.

@@ -1,17 +1,19 @@
-//! int8 rows times int4 weights in groups of 32 columns: tile\[r\]\[c\] = sum_g s\[c\]\[g\] (sum_{k in g} q\[r\]\[k\] (n\[c\]\[k\] - 8)).
+//! int8 rows times int4 weights in groups of 32 columns: tile\[r\]\[c\] = sum_g s\[c\]\[g\] (sum_{k
+//! in g} q\[r\]\[k\] (n\[c\]\[k\] - 8)).
 //!
-//! Nibbles n in 0..=15 stand for -8..=7; a group's scale is an f16. The inner sums are exact; the outer sum visits the groups in
-//! ascending order, one fused multiply-add each, from zero. The row's scale is applied by the [`epilogue`](super::epilogue).
+//! Nibbles n in 0..=15 stand for -8..=7; a group's scale is an f16. The inner sums are exact; the
+//! outer sum visits the groups in ascending order, one fused multiply-add each, from zero. The
+//! row's scale is applied by the [`epilogue`](super::epilogue).
 //!
-//! Packed panel: for each pair of groups nine lines of 64 bytes, read one after the other: four a group, line j holding for each of 16
-//! lanes 4 bytes, byte i with column 8j + i in the low nibble and 8j + 4 + i in the high one, and one with the 16 f16 scales of
-//! both groups.
+//! Packed panel: for each pair of groups nine lines of 64 bytes, read one after the other: four a
+//! group, line j holding for each of 16 lanes 4 bytes, byte i with column 8j + i in the low nibble
+//! and 8j + 4 + i in the high one, and one with the 16 f16 scales of both groups.
 
 use half::f16;
 
-use super::packed::{NR, Onward, Tile};
-use super::quantize_rows::GROUP;
-use super::{Level, Variant};
+use super::operation::operation;
+use super::packed::{NR, Panels, Tile};
+use super::quantize_rows::{GROUP, Int8Rows};
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -26,6 +28,8 @@ mod i8mm;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 mod scalar;
+#[cfg(test)]
+mod tests;
 
 /// Where an int4 weight and its scale lie.
 #[derive(Debug, Clone, Copy)]
@@ -59,7 +63,8 @@ impl Geometry {
         (group / 2 * PAIR_BYTES + 2 * GROUP_BYTES) / 2 + group % 2 * NR
     }
 
-    /// Writes 16 rows (fewer: the last panel) of `cols` nibbles, two a byte, into the bytes of one panel, which are zero.
+    /// Writes 16 rows (fewer: the last panel) of `cols` nibbles, two a byte, into the bytes of one
+    /// panel, which are zero.
     pub(crate) fn pack(q: &[u8], cols: usize, panel: &mut [u8]) {
         for (lane, row) in q.chunks_exact(cols.div_ceil(2)).enumerate() {
             for (i, from) in row.chunks(4).enumerate() {
@@ -96,51 +101,32 @@ fn spread(nibbles: u32) -> u32 {
     (bytes | bytes << 4) & 0x0f0f_0f0f
 }
 
-/// Operands: as of the int8 product, with int4 panels; `scales` is the same memory as `weights`.
+/// Operands; `scales` is the same memory as `weights`.
 pub(crate) struct Job<'a> {
-    pub(crate) q: &'a [i8],
-    pub(crate) sums: &'a [i32],
-    /// From one row of q to the next.
-    pub(crate) stride: usize,
-    pub(crate) rows: usize,
+    pub(crate) x: Int8Rows<'a>,
     pub(crate) weights: &'a [u8],
     pub(crate) scales: &'a [f16],
     pub(crate) geo: Geometry,
-    pub(crate) first: usize,
-    pub(crate) panels: usize,
-    #[allow(dead_code, reason = "some variants prefetch")]
-    pub(crate) next: Onward,
+    pub(crate) panels: Panels,
 }
 
 impl Job<'_> {
     /// What every variant relies on.
     pub(crate) fn check(&self) {
-        assert!((1..=16).contains(&self.rows) && (1..=4).contains(&self.panels), "rows 1..=16, panels 1..=4");
-        assert!(self.stride >= self.geo.padded() && self.q.len() >= self.rows * self.stride, "rows are padded");
-        assert!(self.sums.len() >= self.rows * self.geo.groups, "sums of every group");
-        let bytes = (self.first + self.panels) * self.geo.panel;
-        assert!(self.weights.len() >= bytes && self.scales.len() >= bytes / 2, "panels exist");
+        self.x.check(self.geo.padded());
+        self.panels.check(self.weights.len(), self.geo.panel);
+        assert!(self.scales.len() == self.weights.len() / 2, "scales are the memory of the weights");
     }
 }
 
-/// A variant's entry; unsafe to call on a CPU without its level.
-pub(crate) type Run = unsafe fn(&Job<'_>, &mut Tile<f32>);
-
-pub(crate) static VARIANTS: &[Variant<Run>] = &[
-    Variant { name: "scalar", level: Level::Scalar, run: scalar::run },
-    #[cfg(target_arch = "x86_64")]
-    Variant { name: "avx2", level: Level::Avx2, run: avx2::run },
-    #[cfg(target_arch = "x86_64")]
-    Variant { name: "avxvnni", level: Level::AvxVnni, run: avxvnni::run },
-    #[cfg(target_arch = "x86_64")]
-    Variant { name: "avx512_vnni", level: Level::Avx512, run: avx512::run },
-    #[cfg(target_arch = "aarch64")]
-    Variant { name: "neon", level: Level::Neon, run: neon::run },
-    #[cfg(target_arch = "aarch64")]
-    Variant { name: "dotprod", level: Level::Dotprod, run: dotprod::run },
-    #[cfg(target_arch = "aarch64")]
-    Variant { name: "i8mm", level: Level::I8mm, run: i8mm::run },
-];
-
-#[cfg(test)]
-mod tests;
+operation! {
+    /// The product of a [`Job`] that [`Job::check`] accepts.
+    MatmulI8I4 = "matmul_i8dx_i4g", (fn(job: &Job<'_>, tile: &mut Tile<f32>));
+    (Scalar => scalar::run)
+    (Neon => neon::run)
+    (Dotprod => dotprod::run)
+    (I8mm => i8mm::run)
+    (Avx2 => avx2::run)
+    (AvxVnni => avxvnni::run)
+    (Avx512 => avx512::run)
+}

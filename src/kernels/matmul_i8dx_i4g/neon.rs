@@ -1,9 +1,10 @@
-//! ARMv8.0: the eight products of an i16 lane, each at most 15 * 127, add up to at most 15,240, so a group is summed by `smlal`
-//! in i16 and widened once.
+//! ARMv8.0: the eight products of an i16 lane, each at most 15 * 127, add up to at most 15,240, so
+//! a group is summed by `smlal` in i16 and widened once.
 
 use std::arch::aarch64::*;
 
 use super::{GROUP, Geometry, Job, NR, Tile};
+use crate::kernels::packed::for_blocks;
 
 #[target_feature(enable = "neon")]
 pub(super) fn run(job: &Job<'_>, tile: &mut Tile<f32>) {
@@ -20,8 +21,8 @@ pub(super) fn run(job: &Job<'_>, tile: &mut Tile<f32>) {
     });
 }
 
-/// The product on 128 bits: `dot(w, x, start)` adds to `start` the products of four outputs, whose weights for columns 4k .. 4k + 4 are
-/// register k of `w`, with the 32 activations at `x`.
+/// The product on 128 bits: `dot(w, x, start)` adds to `start` the products of four outputs, whose
+/// weights for columns 4k .. 4k + 4 are register k of `w`, with the 32 activations at `x`.
 #[target_feature(enable = "neon")]
 pub(super) fn run_with(
     job: &Job<'_>,
@@ -29,16 +30,10 @@ pub(super) fn run_with(
     dot: impl Fn(&[int8x16_t; GROUP / 4], *const i8, int32x4_t) -> int32x4_t + Copy,
 ) {
     job.check();
-    for p in 0..job.panels {
-        for r in (0..job.rows).step_by(4) {
-            match job.rows - r {
-                1 => block::<1>(job, (r, p), tile, dot),
-                2 => block::<2>(job, (r, p), tile, dot),
-                3 => block::<3>(job, (r, p), tile, dot),
-                _ => block::<4>(job, (r, p), tile, dot),
-            }
-        }
-    }
+    for_blocks!(
+        0..job.x.rows, job.panels.count, 4, R in [1 2 3 4], P in [1],
+        |r, p| block::<R>(job, (r, p), tile, dot)
+    );
 }
 
 /// Rows from `from.0`, panel `from.1` of the job.
@@ -49,12 +44,12 @@ fn block<const R: usize>(
     tile: &mut Tile<f32>,
     dot: impl Fn(&[int8x16_t; GROUP / 4], *const i8, int32x4_t) -> int32x4_t + Copy,
 ) {
-    let (groups, panel, stride) = (job.geo.groups, job.geo.panel, job.stride);
-    let start = (job.first + from.1) * panel;
+    let (groups, panel, stride) = (job.geo.groups, job.geo.panel, job.x.stride);
+    let start = (job.panels.first + from.1) * panel;
     let weights = job.weights[start..][..panel].as_ptr();
     let scales = job.scales[start / 2..][..panel / 2].as_ptr().cast::<u16>();
-    let q = job.q[from.0 * stride..][..R * stride].as_ptr();
-    let sums = &job.sums[from.0 * groups..][..R * groups];
+    let q = job.x.q[from.0 * stride..][..R * stride].as_ptr();
+    let sums = &job.x.sums[from.0 * groups..][..R * groups];
     let mut total = [[vdupq_n_f32(0.0); 4]; R];
     for g in 0..groups {
         for i in 0..4 {

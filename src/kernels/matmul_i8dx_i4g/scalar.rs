@@ -5,10 +5,10 @@ use super::{GROUP, GROUP_BYTES, Geometry, Job, NR, Tile};
 pub(super) fn run(job: &Job<'_>, tile: &mut Tile<f32>) {
     job.check();
     let padded = job.geo.padded();
-    for r in 0..job.rows {
-        let q = &job.q[r * job.stride..][..padded];
-        for p in 0..job.panels {
-            let start = (job.first + p) * job.geo.panel;
+    for r in 0..job.x.rows {
+        let q = &job.x.q[r * job.x.stride..][..padded];
+        for p in 0..job.panels.count {
+            let start = (job.panels.first + p) * job.geo.panel;
             let weights = &job.weights[start..][..job.geo.panel];
             let scales = &job.scales[start / 2..][..job.geo.panel / 2];
             let mut sum = [0.0f32; NR];

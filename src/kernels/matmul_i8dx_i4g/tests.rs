@@ -1,16 +1,20 @@
 use half::f16;
 
-use super::{GROUP, Geometry, Job, VARIANTS};
-use crate::kernels::packed::{Buffer, NR, Onward, TILE_COLS, Tile};
-use crate::kernels::testing::{Random, available, bits};
+use super::{GROUP, Geometry, Job, MatmulI8I4};
+use crate::kernels::operation::Kernel;
+use crate::kernels::packed::{Buffer, NR, Panels, PrefetchTarget, TILE_COLS, Tile};
+use crate::kernels::quantize_rows::Int8Rows;
+use crate::kernels::testing::{Random, Results, bits};
 
-/// Runs every available variant; bits as of the reference, and values as of plain loops in f64.
+/// Runs a variant: values as of plain loops in f64.
 fn compare(
+    kernel: Kernel<MatmulI8I4>,
     random: &mut Random,
     rows: usize,
     cols: usize,
     nibble: impl Fn(&mut Random) -> u8,
     x: impl Fn(&mut Random) -> i8,
+    results: &mut Results,
 ) {
     let geo = Geometry::new(cols);
     let padded = geo.padded();
@@ -39,17 +43,13 @@ fn compare(
     }
     let (weights, scales) = (buffer.of::<u8>(), buffer.of::<f16>());
     let first = random.below(3);
-    let panels = (1 + random.below(4)).min(6 - first);
-    let job =
-        Job { q, sums: &sums, stride, rows, weights, scales, geo, first, panels, next: Onward::new(weights, 0, 0) };
-    let run = |v: &crate::kernels::Variant<super::Run>| {
-        let mut tile: Tile<f32> = [[7.0; TILE_COLS]; 16];
-        // SAFETY: `available` yields only what this CPU can run.
-        unsafe { (v.run)(&job, &mut tile) };
-        tile[..rows].iter().map(|r| r[..panels * NR].to_vec()).collect::<Vec<_>>()
-    };
-    let want = run(&VARIANTS[0]);
-    for (r, row) in want.iter().enumerate() {
+    let count = (1 + random.below(4)).min(6 - first);
+    let x = Int8Rows { q, wide: &[], sums: &sums, stride, rows };
+    let panels = Panels { first, count, next: PrefetchTarget::new(weights, 0, 0) };
+    let mut tile: Tile<f32> = [[7.0; TILE_COLS]; 16];
+    kernel.run(&Job { x, weights, scales, geo, panels }, &mut tile);
+    let columns = |row: &[f32; TILE_COLS]| row[..count * NR].to_vec();
+    for (r, row) in tile[..rows].iter().map(columns).enumerate() {
         for (c, &got) in row.iter().enumerate() {
             let out = first * NR + c;
             let (mut sum, mut size) = (0.0f64, 1e-3);
@@ -63,30 +63,23 @@ fn compare(
             assert!((f64::from(got) - sum).abs() < 1e-6 * size, "({r},{c}): {got} for {sum}");
         }
     }
-    for v in available(VARIANTS) {
-        for (got, want) in run(v).iter().zip(&want) {
-            assert_eq!(bits(got), bits(want), "{} {rows} x {cols}, {panels} panels", v.name);
-        }
-    }
+    let bits = tile[..rows].iter().flat_map(|row| bits(&row[..count * NR]));
+    results.add(format_args!("{rows} x {cols}, {count} panels"), bits);
 }
 
-#[test]
-fn variants_have_the_bits_of_the_reference() {
+pub(super) fn cases(kernel: Kernel<MatmulI8I4>, results: &mut Results) {
     let mut random = Random(111);
     for cols in (1..70).step_by(5).chain([96, 128, 288]) {
         for rows in 1..=16 {
-            compare(&mut random, rows, cols, |r| r.bits() as u8, |r| (r.bits() as i8).max(-127));
+            let (nibble, x) = (|r: &mut Random| r.bits() as u8, |r: &mut Random| (r.bits() as i8).max(-127));
+            compare(kernel, &mut random, rows, cols, nibble, x, results);
         }
     }
-}
-
-#[test]
-fn extremes_do_not_saturate() {
-    let mut random = Random(112);
+    // Extremes, which must not saturate.
     for cols in [32, 1024] {
         for nibble in [0, 8, 15] {
             for x in [-127i8, 127] {
-                compare(&mut random, 4, cols, |_| nibble, |_| x);
+                compare(kernel, &mut random, 4, cols, |_| nibble, |_| x, results);
             }
         }
     }

@@ -1,15 +1,17 @@
-//! `sdot`: each i32 lane gains four products of its four bytes with one quad of the activations, chosen by lane.
+//! `sdot`: each i32 lane gains four products of its four bytes with one quad of the activations,
+//! chosen by lane.
 
 use std::arch::aarch64::*;
 use std::arch::asm;
 
 use super::{Job, NR, Tile};
-use crate::kernels::packed::for_rows;
+use crate::kernels::packed::for_blocks;
 
 /// Parts of a panel's columns that are read side by side.
 const STREAMS: usize = 2;
 
-/// acc + products of each lane's four bytes of `w` with quad `LANE` of `x`; the intrinsic is not stable yet.
+/// acc + products of each lane's four bytes of `w` with quad `LANE` of `x`; the intrinsic is not
+/// stable yet.
 #[target_feature(enable = "neon,dotprod")]
 pub(crate) fn sdot<const LANE: usize>(mut acc: int32x4_t, w: int8x16_t, x: int8x16_t) -> int32x4_t {
     // SAFETY: one register-only instruction of a feature that this function requires.
@@ -20,48 +22,22 @@ pub(crate) fn sdot<const LANE: usize>(mut acc: int32x4_t, w: int8x16_t, x: int8x
     acc
 }
 
+/// Accumulators fit 24 of 32 registers: 4 panels of 1 row, 2 of 2 or 3, 1 of up to 6.
 #[target_feature(enable = "neon,dotprod")]
 pub(super) fn run(job: &Job<'_>, tile: &mut Tile<i32>) {
     job.check();
-    for_rows!(job.rows, R => rows::<R>(job, tile))
-}
-
-/// Accumulators fit 24 of 32 registers: 4 panels of 1 row, 2 of 2 or 3, 1 of up to 6; more rows go in portions over the same panel.
-#[target_feature(enable = "neon,dotprod")]
-fn rows<const R: usize>(job: &Job<'_>, tile: &mut Tile<i32>) {
-    let mut p = 0;
-    while R == 1 && p + 4 <= job.panels {
-        block::<R, 4>(job, 0, p, tile);
-        p += 4;
-    }
-    while R <= 3 && p + 2 <= job.panels {
-        block::<R, 2>(job, 0, p, tile);
-        p += 2;
-    }
-    while p < job.panels {
-        let mut r = 0;
-        while R - r >= 6 {
-            block::<6, 1>(job, r, p, tile);
-            r += 6;
-        }
-        match R - r {
-            1 => block::<1, 1>(job, r, p, tile),
-            2 => block::<2, 1>(job, r, p, tile),
-            3 => block::<3, 1>(job, r, p, tile),
-            4 => block::<4, 1>(job, r, p, tile),
-            5 => block::<5, 1>(job, r, p, tile),
-            _ => {}
-        }
-        p += 1;
-    }
+    for_blocks!(
+        0..job.x.rows, job.panels.count, 6, R in [1 2 3 4 5 6], P in [4 2 1],
+        |r, p| block::<R, P>(job, r, p, tile)
+    );
 }
 
 /// Rows from `row`, panels from `p` of the job.
 #[target_feature(enable = "neon,dotprod")]
 fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<i32>) {
     let padded = job.geo.padded;
-    let weights = job.weights[(job.first + p) * job.geo.panel..][..P * job.geo.panel].as_ptr().cast::<i8>();
-    let q = job.q[row * job.stride..][..R * job.stride].as_ptr();
+    let weights = job.weights[(job.panels.first + p) * job.geo.panel..][..P * job.geo.panel].as_ptr().cast::<i8>();
+    let q = job.x.q[row * job.x.stride..][..R * job.x.stride].as_ptr();
     let mut acc = [[[vdupq_n_s32(0); 4]; P]; R];
     // Sixteen columns at a time: four lines of weights, one register of activations a row.
     let part = padded / 16 / STREAMS;
@@ -69,10 +45,11 @@ fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, ti
         for s in 0..STREAMS {
             let k = k + s * part;
             // SAFETY: columns 16k .. 16k + 16 of row r, within R rows, `stride` apart.
-            let x: [int8x16_t; R] = std::array::from_fn(|r| unsafe { vld1q_s8(q.add(r * job.stride + 16 * k)) });
+            let x: [int8x16_t; R] = std::array::from_fn(|r| unsafe { vld1q_s8(q.add(r * job.x.stride + 16 * k)) });
             for c in 0..P {
                 for i in 0..4 {
-                    // SAFETY: 16 bytes of each of the lines 4k .. 4k + 4 of panel c, within the slice.
+                    // SAFETY: 16 bytes of each of the lines 4k .. 4k + 4 of panel c, within the
+                    // slice.
                     let w: [int8x16_t; 4] = std::array::from_fn(|j| unsafe {
                         vld1q_s8(weights.add(c * job.geo.panel + (4 * k + j) * 64 + i * 16))
                     });

@@ -1,10 +1,12 @@
-//! `smmla`: two rows of eight activations times two outputs of eight weights, accumulated as the 2 x 2 block
-//! (row 0: outputs 0 and 1, row 1: outputs 0 and 1). An odd last row is paired with itself and its second half dropped.
+//! `smmla`: two rows of eight activations times two outputs of eight weights, accumulated as the 2
+//! x 2 block (row 0: outputs 0 and 1, row 1: outputs 0 and 1). An odd last row is paired with
+//! itself and its second half dropped.
 
 use std::arch::aarch64::*;
 use std::arch::asm;
 
 use super::{Job, NR, Tile};
+use crate::kernels::packed::for_blocks;
 
 /// Parts of a panel's columns that are read side by side.
 const STREAMS: usize = 4;
@@ -23,27 +25,20 @@ pub(crate) fn smmla(mut acc: int32x4_t, x: int8x16_t, w: int8x16_t) -> int32x4_t
 #[target_feature(enable = "neon,i8mm")]
 pub(super) fn run(job: &Job<'_>, tile: &mut Tile<i32>) {
     job.check();
-    for p in 0..job.panels {
-        let mut r = 0;
-        while r < job.rows {
-            match job.rows - r {
-                1 | 2 => block::<1>(job, r, p, tile),
-                3 | 4 => block::<2>(job, r, p, tile),
-                _ => block::<3>(job, r, p, tile),
-            }
-            r += if job.rows - r > 4 { 6 } else { 4 };
-        }
-    }
+    for_blocks!(
+        0..job.x.rows.div_ceil(2), job.panels.count, 3, PAIRS in [1 2 3], P in [1],
+        |pair, p| block::<PAIRS>(job, 2 * pair, p, tile)
+    );
 }
 
 /// `PAIRS` pairs of rows from `row`, panel `p` of the job.
 #[target_feature(enable = "neon,i8mm")]
 fn block<const PAIRS: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<i32>) {
     let padded = job.geo.padded;
-    let weights = job.weights[(job.first + p) * job.geo.panel..][..NR * padded].as_ptr().cast::<i8>();
-    let last = job.rows - 1;
+    let weights = job.weights[(job.panels.first + p) * job.geo.panel..][..NR * padded].as_ptr().cast::<i8>();
+    let last = job.x.rows - 1;
     let rows: [[*const i8; 2]; PAIRS] =
-        std::array::from_fn(|i| [0, 1].map(|j| job.q[last.min(row + 2 * i + j) * job.stride..][..padded].as_ptr()));
+        std::array::from_fn(|i| [0, 1].map(|j| job.x.q[last.min(row + 2 * i + j) * job.x.stride..][..padded].as_ptr()));
     let mut acc = [[vdupq_n_s32(0); 8]; PAIRS];
     let part = padded / 8 / STREAMS;
     for k in 0..part {

@@ -1,13 +1,16 @@
 //! int8 rows times int8 weights: tile\[r\]\[c\] = sum_k q\[r\]\[k\] w\[c\]\[k\], exact in i32.
 //!
-//! `i8dx`: int8 activations, symmetric, quantised per row when they come ([`quantize_rows`](super::quantize_rows)), in -127..=127.
-//! `i8cx`: int8 weights, symmetric, one scale per output channel, in -128..=127. Scales are applied by the [`epilogue`](super::epilogue).
-//! Contract of a variant: it fills the first `rows` rows and `16 panels` columns of the tile from a [`Job`] that [`Job::check`] accepts.
-//! Sums stay below 2^31 for up to 131,071 columns, also with weights offset to unsigned.
+//! `i8dx`: int8 activations, symmetric, quantised per row when they come
+//! ([`quantize_rows`](super::quantize_rows)), in -127..=127. `i8cx`: int8 weights, symmetric, one
+//! scale per output channel, in -128..=127. Scales are applied by the
+//! [`epilogue`](super::epilogue). A variant fills as many rows as there are, and 16 columns per
+//! panel, of the tile. Sums stay below 2^31 for up to 131,071 columns, also with weights offset to
+//! unsigned.
 
-use super::packed::{NR, Onward, Tile};
-use super::quantize_rows::GROUP;
-use super::{Level, Variant, interleave};
+use super::interleave;
+use super::operation::operation;
+use super::packed::{NR, Panels, Tile};
+use super::quantize_rows::{GROUP, Int8Rows};
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -22,6 +25,8 @@ pub(crate) mod i8mm;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 mod scalar;
+#[cfg(test)]
+mod tests;
 
 /// Order of the bytes of 16 outputs x 4 or 8 columns in packed weights, as a variant wants them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,9 +34,11 @@ mod scalar;
 pub(crate) enum Layout {
     /// Lines of 64 bytes: for each lane 4 consecutive columns.
     Quads,
-    /// [`Quads`](Self::Quads) with 128 added to each weight: unsigned. The kernel takes off 128 times the row's sum.
+    /// [`Quads`](Self::Quads) with 128 added to each weight: unsigned. The kernel takes off 128
+    /// times the row's sum.
     QuadsOffset,
-    /// [`Quads`](Self::Quads) with the columns of a lane in the order 0, 2, 1, 3: even bytes hold columns 0 and 1.
+    /// [`Quads`](Self::Quads) with the columns of a lane in the order 0, 2, 1, 3: even bytes hold
+    /// columns 0 and 1. The kernel takes activations widened to int16.
     QuadsPaired,
     /// Pairs of lines: for each lane 8 consecutive columns.
     Octets,
@@ -42,9 +49,17 @@ pub(crate) enum Layout {
 pub(crate) struct Geometry {
     /// Columns, padded with zeros to whole groups.
     pub(crate) padded: usize,
-    /// Bytes of one panel: `16 padded` and one line, which keeps panels in different sets of the first-level cache.
+    /// Bytes of one panel: `16 padded` and one line, which keeps panels in different sets of the
+    /// first-level cache.
     pub(crate) panel: usize,
     pub(crate) layout: Layout,
+}
+
+impl Layout {
+    /// Whether the variant reads activations widened to int16.
+    pub(crate) fn wide(self) -> bool {
+        self == Self::QuadsPaired
+    }
 }
 
 impl Geometry {
@@ -102,77 +117,31 @@ impl Geometry {
     }
 }
 
-/// Operands: `rows` in 1..=16 rows of `geo.padded` values, `stride` apart, at `q` (and widened at `wide`, where the variant asks for it), the sums of
-/// their groups of 32 at `sums`; `panels` in 1..=4 panels from `first`.
+/// Operands.
 pub(crate) struct Job<'a> {
-    pub(crate) q: &'a [i8],
-    #[allow(dead_code, reason = "the AVX2 variant alone reads it")]
-    pub(crate) wide: &'a [i16],
-    pub(crate) sums: &'a [i32],
-    /// From one row of q to the next.
-    pub(crate) stride: usize,
-    pub(crate) rows: usize,
+    pub(crate) x: Int8Rows<'a>,
     pub(crate) weights: &'a [u8],
     pub(crate) geo: Geometry,
-    pub(crate) first: usize,
-    pub(crate) panels: usize,
-    #[allow(dead_code, reason = "some variants prefetch")]
-    pub(crate) next: Onward,
+    pub(crate) panels: Panels,
 }
 
 impl Job<'_> {
     /// What every variant relies on.
     pub(crate) fn check(&self) {
-        let groups = self.geo.padded / GROUP;
-        assert!((1..=16).contains(&self.rows) && (1..=4).contains(&self.panels), "rows 1..=16, panels 1..=4");
-        assert!(self.stride >= self.geo.padded && self.q.len() >= self.rows * self.stride, "rows are padded");
-        assert!(self.sums.len() >= self.rows * groups, "sums of every group");
-        assert!(self.weights.len() >= (self.first + self.panels) * self.geo.panel, "panels exist");
+        self.x.check(self.geo.padded);
+        self.panels.check(self.weights.len(), self.geo.panel);
     }
 }
 
-/// A variant: its entry (unsafe to call on a CPU without its level), the layout it reads, and whether it reads `wide`.
-pub(crate) struct Kernel {
-    pub(crate) run: unsafe fn(&Job<'_>, &mut Tile<i32>),
-    pub(crate) layout: Layout,
-    pub(crate) wide: bool,
+operation! {
+    /// The product of a [`Job`] that [`Job::check`] accepts, with weights packed in the variant's
+    /// [`Layout`].
+    MatmulI8I8 = "matmul_i8dx_i8cx", (fn(job: &Job<'_>, tile: &mut Tile<i32>)), about Layout;
+    (Scalar => scalar::run, Layout::Quads)
+    (Neon => neon::run, Layout::Quads)
+    (Dotprod => dotprod::run, Layout::Quads)
+    (I8mm => i8mm::run, Layout::Octets)
+    (Avx2 => avx2::run, Layout::QuadsPaired)
+    (AvxVnni => avxvnni::run, Layout::QuadsOffset)
+    (Avx512 => avx512::run, Layout::QuadsOffset)
 }
-
-pub(crate) static VARIANTS: &[Variant<Kernel>] = &[
-    Variant {
-        name: "scalar",
-        level: Level::Scalar,
-        run: Kernel { run: scalar::run, layout: Layout::Quads, wide: false },
-    },
-    #[cfg(target_arch = "x86_64")]
-    Variant {
-        name: "avx2",
-        level: Level::Avx2,
-        run: Kernel { run: avx2::run, layout: Layout::QuadsPaired, wide: true },
-    },
-    #[cfg(target_arch = "x86_64")]
-    Variant {
-        name: "avxvnni",
-        level: Level::AvxVnni,
-        run: Kernel { run: avxvnni::run, layout: Layout::QuadsOffset, wide: false },
-    },
-    #[cfg(target_arch = "x86_64")]
-    Variant {
-        name: "avx512_vnni",
-        level: Level::Avx512,
-        run: Kernel { run: avx512::run, layout: Layout::QuadsOffset, wide: false },
-    },
-    #[cfg(target_arch = "aarch64")]
-    Variant { name: "neon", level: Level::Neon, run: Kernel { run: neon::run, layout: Layout::Quads, wide: false } },
-    #[cfg(target_arch = "aarch64")]
-    Variant {
-        name: "dotprod",
-        level: Level::Dotprod,
-        run: Kernel { run: dotprod::run, layout: Layout::Quads, wide: false },
-    },
-    #[cfg(target_arch = "aarch64")]
-    Variant { name: "i8mm", level: Level::I8mm, run: Kernel { run: i8mm::run, layout: Layout::Octets, wide: false } },
-];
-
-#[cfg(test)]
-mod tests;

@@ -3,12 +3,8 @@
 use super::EPSILON;
 use crate::kernels::math::{LANES, fold};
 
-pub(super) fn run(x: &[f32], shift: &[f32], scale: &[f32], y: &mut [f32]) {
-    body(x, shift, scale, y);
-}
-
 #[inline(always)]
-pub(super) fn body(x: &[f32], shift: &[f32], scale: &[f32], y: &mut [f32]) {
+pub(super) fn run(x: &[f32], shift: &[f32], scale: &[f32], y: &mut [f32]) {
     let n = x.len();
     assert!(n > 0 && shift.len() == n && scale.len() == n && y.len() == n, "norm: equal lengths");
     let (head, tail) = x.as_chunks::<LANES>();

@@ -1,18 +1,15 @@
-//! The reference: 16 matrices side by side in plain arrays, which variants compile for their level.
+//! The reference: 16 matrices side by side in plain arrays.
 
 use crate::kernels::math::LANES;
 
-pub(super) fn run(m: &[[f32; 9]], out: &mut [[f32; 9]]) {
-    body(m, out);
-}
-
 type V = [f32; LANES];
 
-/// Jacobi converges quadratically: off-diagonal entries reach rounding after four sweeps, even from repeated eigenvalues.
+/// Jacobi converges quadratically: off-diagonal entries reach rounding after four sweeps, even from
+/// repeated eigenvalues.
 const SWEEPS: usize = 5;
 
 #[inline(always)]
-pub(super) fn body(m: &[[f32; 9]], out: &mut [[f32; 9]]) {
+pub(super) fn run(m: &[[f32; 9]], out: &mut [[f32; 9]]) {
     for (m, out) in m.chunks(LANES).zip(out.chunks_mut(LANES)) {
         let mut a = [[0.0f32; LANES]; 9];
         for (lane, m) in m.iter().enumerate() {
@@ -45,7 +42,8 @@ fn each(f: impl Fn(usize) -> f32) -> V {
 #[inline(always)]
 fn block(a: &[V; 9]) -> [V; 9] {
     let at = |r: usize, c: usize| &a[3 * r + c];
-    // K for R that maps the columns' side to the rows' side: tr(R^T A) = q^T K q with q = (w, x, y, z).
+    // K for R that maps the columns' side to the rows' side: tr(R^T A) = q^T K q with q = (w, x, y,
+    // z).
     let mut k = [[[0.0f32; LANES]; 4]; 4];
     let (xx, yy, zz) = (at(0, 0), at(1, 1), at(2, 2));
     k[0][0] = each(|i| xx[i] + yy[i] + zz[i]);
@@ -102,8 +100,9 @@ fn block(a: &[V; 9]) -> [V; 9] {
 
 /// One Jacobi rotation that clears k\[p\]\[q\] (upper triangle kept), accumulated into v.
 ///
-/// t = sign(theta) / (|theta| + sqrt(theta^2 + 1)) with theta = (k_qq - k_pp) / (2 k_pq), written as
-/// 2 k_pq sign(d) / (|d| + sqrt(d^2 + 4 k_pq^2)), d = k_qq - k_pp, which needs no test for k_pq = 0.
+/// t = sign(theta) / (|theta| + sqrt(theta^2 + 1)) with theta = (k_qq - k_pp) / (2 k_pq), written
+/// as 2 k_pq sign(d) / (|d| + sqrt(d^2 + 4 k_pq^2)), d = k_qq - k_pp, which needs no test for k_pq
+/// = 0.
 #[inline(always)]
 fn rotate(k: &mut [[V; 4]; 4], v: &mut [[V; 4]; 4], p: usize, q: usize) {
     let apq = k[p][q];

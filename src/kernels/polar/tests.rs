@@ -1,12 +1,12 @@
-use super::VARIANTS;
-use crate::kernels::testing::{Random, available};
+use super::Polar;
+use crate::kernels::operation::Kernel;
+use crate::kernels::testing::{Random, Results, bits};
 
 type M = [f32; 9];
 
-fn run(v: &crate::kernels::Variant<super::Run>, m: &[M]) -> Vec<M> {
+fn run(kernel: Kernel<Polar>, m: &[M]) -> Vec<M> {
     let mut out = vec![[0.0; 9]; m.len()];
-    // SAFETY: `available` yields only what this CPU can run.
-    unsafe { (v.run)(m, &mut out) };
+    kernel.run(m, &mut out);
     out
 }
 
@@ -47,15 +47,11 @@ fn assert_rotation(r: &M) {
     assert!((det(r) - 1.0).abs() < 3e-6, "determinant of {r:?}");
 }
 
-#[test]
-fn variants_have_the_bits_of_the_reference() {
+pub(super) fn cases(kernel: Kernel<Polar>, results: &mut Results) {
     let mut random = Random(11);
     for n in (0..50).chain([127 * 4]) {
         let m: Vec<M> = (0..n).map(|_| std::array::from_fn(|_| random.unit() * 10.0)).collect();
-        let want = run(&VARIANTS[0], &m);
-        for v in available(VARIANTS) {
-            assert_eq!(run(v, &m), want, "{}", v.name);
-        }
+        results.add(n, bits(run(kernel, &m).as_flattened()));
     }
 }
 
@@ -74,10 +70,14 @@ fn stretched_and_noisy_rotations_come_back() {
             m.push(mul(&r, &spd).map(|v| v * size));
             want.push(r);
         }
-        for v in available(VARIANTS) {
-            for (got, want) in run(v, &m).iter().zip(&want) {
+        for kernel in Kernel::all() {
+            for (got, want) in run(kernel, &m).iter().zip(&want) {
                 assert_rotation(got);
-                assert!(got.iter().zip(want).all(|(a, b)| (a - b).abs() < 1e-5), "{}: {got:?} for {want:?}", v.name);
+                assert!(
+                    got.iter().zip(want).all(|(a, b)| (a - b).abs() < 1e-5),
+                    "{}: {got:?} for {want:?}",
+                    kernel.level()
+                );
             }
         }
     }
@@ -88,13 +88,13 @@ fn reflections_get_the_best_rotation() {
     let mut random = Random(13);
     for _ in 0..100 {
         let m: M = std::array::from_fn(|_| random.unit());
-        for v in available(VARIANTS) {
-            let got = run(v, &[m])[0];
+        for kernel in Kernel::all() {
+            let got = run(kernel, &[m])[0];
             assert_rotation(&got);
             let trace = |r: &M| r.iter().zip(&m).map(|(a, b)| a * b).sum::<f32>();
             for _ in 0..50 {
                 let other = rotation(&mut random);
-                assert!(trace(&other) <= trace(&got) + 1e-4, "{}: {other:?} beats {got:?} for {m:?}", v.name);
+                assert!(trace(&other) <= trace(&got) + 1e-4, "{}: {other:?} beats {got:?} for {m:?}", kernel.level());
             }
         }
     }
@@ -107,11 +107,11 @@ fn degenerate_and_broken_matrices_give_rotations() {
     cases.push([-1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0]);
     cases.push([-1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0]);
     cases.push([f32::INFINITY, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
-    for v in available(VARIANTS) {
-        for (m, r) in cases.iter().zip(run(v, &cases)) {
-            assert!(r.iter().all(|v| v.is_finite()), "{}: {r:?} for {m:?}", v.name);
+    for kernel in Kernel::all() {
+        for (m, r) in cases.iter().zip(run(kernel, &cases)) {
+            assert!(r.iter().all(|v| v.is_finite()), "{}: {r:?} for {m:?}", kernel.level());
             assert_rotation(&r);
         }
-        assert_eq!(run(v, &[[f32::NAN; 9]])[0], [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
+        assert_eq!(run(kernel, &[[f32::NAN; 9]])[0], [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
     }
 }

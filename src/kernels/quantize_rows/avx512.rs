@@ -1,13 +1,13 @@
 use std::arch::x86_64::*;
 
 use super::GROUP;
-use super::scalar::{MAGIC, TINY, body};
+use super::scalar::{self, MAGIC, TINY};
 
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,f16c")]
 pub(super) fn run(x: &[f32], q: &mut [i8], sums: &mut [i32]) -> f32 {
     let n = x.len();
     if !n.is_multiple_of(4 * GROUP) || q.len() != n || sums.len() * GROUP != n {
-        return body(x, q, sums);
+        return scalar::run(x, q, sums);
     }
     // Four registers wait less for each other than one.
     let mut tops = [_mm512_setzero_si512(); 4];
@@ -22,7 +22,7 @@ pub(super) fn run(x: &[f32], q: &mut [i8], sums: &mut [i32]) -> f32 {
     let [a, b, c, d] = tops;
     let top = f32::from_bits(_mm512_reduce_max_epu32(_mm512_max_epu32(_mm512_max_epu32(a, b), _mm512_max_epu32(c, d))));
     if !(TINY..f32::INFINITY).contains(&top) {
-        return body(x, q, sums);
+        return scalar::run(x, q, sums);
     }
     let (inverse, magic) = (_mm512_set1_ps(127.0 / top), _mm512_set1_ps(MAGIC));
     for ((x, q), sum) in x.as_chunks::<GROUP>().0.iter().zip(q.as_chunks_mut::<GROUP>().0).zip(sums) {

@@ -2,17 +2,14 @@
 
 use super::GROUP;
 
-pub(super) fn run(x: &[f32], q: &mut [i8], sums: &mut [i32]) -> f32 {
-    body(x, q, sums)
-}
-
 /// Below this a row counts as zero: 127 / max|x| would overflow.
 pub(super) const TINY: f32 = 1e-30;
 
 /// Rounds to nearest even: the low byte of x + MAGIC is the integer, for |x| < 2^22.
 pub(in crate::kernels) const MAGIC: f32 = 12_582_912.0;
 
-/// The largest magnitude. They are compared as integers: exact, and a NaN is larger than everything.
+/// The largest magnitude. They are compared as integers: exact, and a NaN is larger than
+/// everything.
 #[inline(always)]
 pub(in crate::kernels) fn largest(x: &[f32]) -> f32 {
     let mut top = [0u32; 16];
@@ -28,7 +25,8 @@ pub(in crate::kernels) fn largest(x: &[f32]) -> f32 {
     f32::from_bits(top.into_iter().fold(0, u32::max))
 }
 
-/// A largest magnitude that a row can be scaled by; else the scale of the row of zeros that stands for it.
+/// A largest magnitude that a row can be scaled by; else the scale of the row of zeros that stands
+/// for it.
 #[inline(always)]
 pub(in crate::kernels) fn scalable(top: f32) -> Result<f32, f32> {
     match top {
@@ -39,7 +37,7 @@ pub(in crate::kernels) fn scalable(top: f32) -> Result<f32, f32> {
 }
 
 #[inline(always)]
-pub(super) fn body(x: &[f32], q: &mut [i8], sums: &mut [i32]) -> f32 {
+pub(super) fn run(x: &[f32], q: &mut [i8], sums: &mut [i32]) -> f32 {
     assert!(q.len() >= x.len() && q.len() == sums.len() * GROUP, "q is padded to whole groups");
     let top = match scalable(largest(x)) {
         Ok(top) => top,

@@ -1,33 +1,31 @@
-use super::{GROUP, VARIANTS};
-use crate::kernels::testing::{Random, available, for_rows_of_all_sizes};
+use super::{GROUP, QuantizeRows};
+use crate::kernels::operation::Kernel;
+use crate::kernels::testing::{Random, Results, for_rows_of_all_sizes};
 
-fn run(v: &crate::kernels::Variant<super::Run>, x: &[f32]) -> (u32, Vec<i8>, Vec<i32>) {
+fn run(kernel: Kernel<QuantizeRows>, x: &[f32]) -> (u32, Vec<i8>, Vec<i32>) {
     let padded = x.len().next_multiple_of(GROUP);
     let (mut q, mut sums) = (vec![99; padded], vec![99; padded / GROUP]);
-    // SAFETY: `available` yields only what this CPU can run.
-    let scale = unsafe { (v.run)(x, &mut q, &mut sums) };
+    let scale = kernel.run(x, &mut q, &mut sums);
     (if scale.is_nan() { u32::MAX } else { scale.to_bits() }, q, sums)
 }
 
-#[test]
-fn variants_have_the_bits_of_the_reference() {
+pub(super) fn cases(kernel: Kernel<QuantizeRows>, results: &mut Results) {
     for_rows_of_all_sizes(51, |x, size| {
-        let want = run(&VARIANTS[0], x);
-        for v in available(VARIANTS) {
-            assert_eq!(run(v, x), want, "{} {} {size}", v.name, x.len());
-        }
+        let (scale, q, sums) = run(kernel, x);
+        let bits = std::iter::once(scale).chain(q.into_iter().map(i32::from).chain(sums).map(|v| v as u32));
+        results.add(format_args!("{} of {size}", x.len()), bits);
     });
 }
 
 #[test]
 fn values_come_back_within_half_a_step() {
     let mut random = Random(52);
-    for v in available(VARIANTS) {
+    for kernel in Kernel::all() {
         let x = random.floats(100, 5.0);
-        let (scale, q, sums) = run(v, &x);
+        let (scale, q, sums) = run(kernel, &x);
         let scale = f32::from_bits(scale);
         for (x, &q) in x.iter().zip(&q) {
-            assert!((x - f32::from(q) * scale).abs() <= 0.50001 * scale, "{}: {x} as {q} * {scale}", v.name);
+            assert!((x - f32::from(q) * scale).abs() <= 0.50001 * scale, "{}: {x} as {q} * {scale}", kernel.level());
         }
         assert_eq!(q.iter().map(|&q| i32::from(q).abs()).max(), Some(127), "the largest value uses the whole range");
         assert_eq!(sums.iter().sum::<i32>(), q.iter().map(|&q| i32::from(q)).sum::<i32>());
@@ -37,8 +35,8 @@ fn values_come_back_within_half_a_step() {
 
 #[test]
 fn halves_round_to_even() {
-    for v in available(VARIANTS) {
-        let (_, q, _) = run(v, &[127.0, 0.5, 1.5, 2.5, -0.5, -1.5, -127.0]);
-        assert_eq!(q[..7], [127, 0, 2, 2, 0, -2, -127], "{}", v.name);
+    for kernel in Kernel::all() {
+        let (_, q, _) = run(kernel, &[127.0, 0.5, 1.5, 2.5, -0.5, -1.5, -127.0]);
+        assert_eq!(q[..7], [127, 0, 2, 2, 0, -2, -127], "{}", kernel.level());
     }
 }

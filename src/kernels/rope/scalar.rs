@@ -1,11 +1,7 @@
 //! The reference: head by head.
 
-pub(super) fn run(x: &mut [f32], cos: &[f32], sin: &[f32]) {
-    body(x, cos, sin);
-}
-
 #[inline(always)]
-pub(super) fn body(x: &mut [f32], cos: &[f32], sin: &[f32]) {
+pub(super) fn run(x: &mut [f32], cos: &[f32], sin: &[f32]) {
     let half = cos.len();
     assert!(half > 0 && sin.len() == half && x.len().is_multiple_of(2 * half), "rope: whole heads");
     for head in x.chunks_exact_mut(2 * half) {

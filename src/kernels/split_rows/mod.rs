@@ -1,36 +1,27 @@
-//! Rows of activations to int16, each as two rows of int8 that the int8 products take one after the other: x = s (254 high + low).
+//! Rows of activations to int16, each as two rows of int8 that the int8 products take one after the
+//! other: x = s (254 high + low).
 //!
-//! s = max|x| / 32258 and q = round(x / s), half to even; high = round(q / 254) and low = q - 254 high, both in -127..=127 (254, not 256: -128 is
-//! outside of what the products take). x W' is then s (254 high W' + low W'): the same weights are read once for both rows, the integer sums stay
-//! exact, and the rounding is 1/254 of that of [`quantize_rows`](super::quantize_rows). The [`epilogue`](super::epilogue) puts the two sums together.
+//! s = max|x| / 32258 and q = round(x / s), half to even; high = round(q / 254) and low = q - 254
+//! high, both in -127..=127 (254, not 256: -128 is outside of what the products take). x W' is then
+//! s (254 high W' + low W'): the same weights are read once for both rows, the integer sums stay
+//! exact, and the rounding is 1/254 of that of [`quantize_rows`](super::quantize_rows). The
+//! [`epilogue`](super::epilogue) puts the two sums together.
 //!
-//! Rows that are tiny, NaN or infinite are treated as there; values past `cols` up to `padded` are zero.
+//! Rows that are tiny, NaN or infinite are treated as there; values past `cols` up to `padded` are
+//! zero.
 
-use super::{Level, Variant};
+use super::operation::operation;
 
-#[cfg(target_arch = "x86_64")]
-mod avx2;
-#[cfg(target_arch = "x86_64")]
-mod avx512;
-#[cfg(target_arch = "aarch64")]
-mod neon;
 mod scalar;
+#[cfg(test)]
+mod tests;
 
 /// What a step of the high row is worth in steps of the low one.
 pub(crate) const BASE: f32 = 254.0;
 
-/// Splits one row: `x` into the high and the low row of `q` (padded as in `quantize_rows`), the sums of their groups into `sums`; returns s.
-pub(crate) type Run = unsafe fn(x: &[f32], q: [&mut [i8]; 2], sums: [&mut [i32]; 2]) -> f32;
-
-pub(crate) static VARIANTS: &[Variant<Run>] = &[
-    Variant { name: "scalar", level: Level::Scalar, run: scalar::run },
-    #[cfg(target_arch = "x86_64")]
-    Variant { name: "avx2", level: Level::Avx2, run: avx2::run },
-    #[cfg(target_arch = "x86_64")]
-    Variant { name: "avx512", level: Level::Avx512, run: avx512::run },
-    #[cfg(target_arch = "aarch64")]
-    Variant { name: "neon", level: Level::Neon, run: neon::run },
-];
-
-#[cfg(test)]
-mod tests;
+operation! {
+    /// Splits one row: `x` into the high and the low row of `q` (padded as in `quantize_rows`), the
+    /// sums of their groups into `sums`; returns s.
+    SplitRows = "split_rows", (fn(x: &[f32], q: [&mut [i8]; 2], sums: [&mut [i32]; 2]) -> f32);
+    (Scalar, Neon, Avx2, Avx512 => scalar::run)
+}

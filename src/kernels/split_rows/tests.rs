@@ -1,15 +1,15 @@
-use super::{BASE, VARIANTS};
+use super::{BASE, SplitRows};
+use crate::kernels::operation::Kernel;
 use crate::kernels::quantize_rows::GROUP;
-use crate::kernels::testing::{Random, available, for_rows_of_all_sizes};
+use crate::kernels::testing::{Random, Results, for_rows_of_all_sizes};
 
 type Rows = (u32, [Vec<i8>; 2], [Vec<i32>; 2]);
 
-fn run(v: &crate::kernels::Variant<super::Run>, x: &[f32]) -> Rows {
+fn run(kernel: Kernel<SplitRows>, x: &[f32]) -> Rows {
     let padded = x.len().next_multiple_of(GROUP);
     let (mut q, mut sums) = ([(); 2].map(|()| vec![99; padded]), [(); 2].map(|()| vec![99; padded / GROUP]));
     let (rows, groups) = (q.each_mut().map(Vec::as_mut_slice), sums.each_mut().map(Vec::as_mut_slice));
-    // SAFETY: `available` yields only what this CPU can run.
-    let scale = unsafe { (v.run)(x, rows, groups) };
+    let scale = kernel.run(x, rows, groups);
     (if scale.is_nan() { u32::MAX } else { scale.to_bits() }, q, sums)
 }
 
@@ -18,27 +18,27 @@ fn joined(q: &[Vec<i8>; 2], i: usize) -> i32 {
     BASE as i32 * i32::from(q[0][i]) + i32::from(q[1][i])
 }
 
-#[test]
-fn variants_have_the_bits_of_the_reference() {
+pub(super) fn cases(kernel: Kernel<SplitRows>, results: &mut Results) {
     for_rows_of_all_sizes(53, |x, size| {
-        let want = run(&VARIANTS[0], x);
-        for v in available(VARIANTS) {
-            assert_eq!(run(v, x), want, "{} {} {size}", v.name, x.len());
-        }
+        let (scale, q, sums) = run(kernel, x);
+        let (q, sums) = (q.into_iter().flatten().map(i32::from), sums.into_iter().flatten());
+        let bits = std::iter::once(scale).chain(q.chain(sums).map(|v| v as u32));
+        results.add(format_args!("{} of {size}", x.len()), bits);
     });
 }
 
 #[test]
 fn values_come_back_within_half_a_step() {
     let mut random = Random(54);
-    for v in available(VARIANTS) {
+    for kernel in Kernel::all() {
         let x = random.floats(100, 5.0);
-        let (scale, q, sums) = run(v, &x);
+        let (scale, q, sums) = run(kernel, &x);
         let scale = f32::from_bits(scale);
         for (i, x) in x.iter().enumerate() {
-            // A float keeps 24 bits of the 16 that are asked for: the rest is the test's own rounding.
+            // A float keeps 24 bits of the 16 that are asked for: the rest is the test's own
+            // rounding.
             let back = joined(&q, i) as f32 * scale;
-            assert!((x - back).abs() <= 0.51 * scale, "{}: {x} as {back} in steps of {scale}", v.name);
+            assert!((x - back).abs() <= 0.51 * scale, "{}: {x} as {back} in steps of {scale}", kernel.level());
         }
         assert_eq!(
             (0..100).map(|i| joined(&q, i).abs()).max(),
@@ -56,9 +56,9 @@ fn values_come_back_within_half_a_step() {
 #[test]
 fn every_integer_comes_back() {
     let x: Vec<f32> = (-32258..=32258).map(|v| v as f32).collect();
-    for v in available(VARIANTS) {
-        let (scale, q, _) = run(v, &x);
-        assert_eq!(f32::from_bits(scale), 1.0, "{}", v.name);
-        assert!((0..x.len()).all(|i| joined(&q, i) == i as i32 - 32258), "{}", v.name);
+    for kernel in Kernel::all() {
+        let (scale, q, _) = run(kernel, &x);
+        assert_eq!(f32::from_bits(scale), 1.0, "{}", kernel.level());
+        assert!((0..x.len()).all(|i| joined(&q, i) == i as i32 - 32258), "{}", kernel.level());
     }
 }

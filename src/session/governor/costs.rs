@@ -1,8 +1,10 @@
-//! What a block costs, in units of work: millions of multiply-adds, as the config's sizes give them.
+//! What a block costs, in units of work: millions of multiply-adds, as the config's sizes give
+//! them.
 //!
-//! A pass over `r` rows counts as `r + 1` rows: reading the weights takes time as well. The shares were checked against block
-//! times of the shipped model: midpoint4, midpoint2 and the single step stand as 4.4 to 2.6 to 1, measured 3.3 to 2.2 to 1. The
-//! governor's headroom covers the difference.
+//! A pass over `r` rows counts as `r + 1` rows: reading the weights takes time as well. The shares
+//! were checked against block times of the shipped model: midpoint4, midpoint2 and the single step
+//! stand as 4.4 to 2.6 to 1, measured 3.3 to 2.2 to 1. The governor's headroom covers the
+//! difference.
 
 use crate::config::Config;
 use crate::flow::Generator;
@@ -70,7 +72,8 @@ impl Work {
     pub(in crate::session) fn block(&self, generator: &Generator, sampler: Sampler, branches: usize) -> [f64; 2] {
         let branches = if sampler == Sampler::Single { 1 } else { branches };
         let evaluation = |behind: u64| {
-            // What does not fit into the pass of the evaluation goes before it, eight tokens a pass.
+            // What does not fit into the pass of the evaluation goes before it, eight tokens a
+            // pass.
             let before = behind.saturating_sub(1) / CHUNK;
             self.row * ((behind + 1) as f64 * branches as f64 + before as f64 + 1.0)
         };

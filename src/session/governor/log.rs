@@ -2,10 +2,12 @@
 
 use super::{Decision, Plan};
 
-/// Changes that are kept: hours of motion on a device whose speed is steady, minutes on one where every block is another.
+/// Changes that are kept: hours of motion on a device whose speed is steady, minutes on one where
+/// every block is another.
 const CAPACITY: usize = 8192;
 
-/// The last decisions, each where it differs from the one before. Allocates when made and never after.
+/// The last decisions, each where it differs from the one before. Allocates when made and never
+/// after.
 #[derive(Debug)]
 pub(in crate::session) struct Log {
     ring: Vec<Decision>,

@@ -1,23 +1,26 @@
 //! The deadline governor: trades quality for time before a block would come too late.
 //!
-//! Quality is a ladder of samplers: 8 evaluations a block, 4, and the single-step student (without a student the ladder ends at
-//! `midpoint1`, 2 evaluations; with one, `midpoint1` is a rung only if asked for, since undistilled two evaluations make
-//! worse motion than the student's one). For every block the governor decides, from the times of the blocks before it,
+//! Quality is a ladder of samplers: 8 evaluations per block, 4, and the single-step student
+//! (without a student the ladder ends at `midpoint1`, 2 evaluations; with one, `midpoint1` is a
+//! rung only if asked for, since undistilled two evaluations make worse motion than the student's
+//! one). For every block the governor decides, from the times of the blocks before it,
 //!
-//! - which rung to use: one whose expected time is at most half the budget, so that a core that suddenly runs at
-//!   half speed, or a stall of half a budget, still misses nothing;
-//! - how many passes to spend on slots that cheaper rungs left behind, so that they are up to date before a climb and no block
-//!   pays for all of it;
+//! - which rung to use: one whose expected time is at most half the budget, so that a core that
+//!   suddenly runs at half speed, or a stall of half a budget, still misses nothing;
+//! - how many passes to spend on slots that cheaper rungs left behind, so that they are up to date
+//!   before a climb and no block pays for all of it;
 //! - whether there is time for a share of re-anchoring;
-//! - when blocks of the last rung came late three times in a row: to stop computing. The last motion eases into a held, breathing
-//!   pose; now and then one step is rehearsed, and motion comes back in a cross-fade when that is fast enough.
+//! - when blocks of the last rung came late three times in a row: to stop computing. The last
+//!   motion eases into a held, breathing pose; now and then one step is rehearsed, and motion comes
+//!   back in a cross-fade when that is fast enough.
 //!
-//! Expected time is work ([`costs`], multiply-adds from the config's sizes) times the slowest recent milliseconds per unit of work,
-//! which relax by 3 % a block. Sessions start on the last rung and climb with the second block. A climb that had to be
-//! taken back makes the next one wait twice as long, up to a minute.
+//! Expected time is work ([`costs`], multiply-adds from the config's sizes) times the slowest
+//! recent milliseconds per unit of work, which relax by 3 % a block. Sessions start on the last
+//! rung and climb with the second block. A climb that had to be taken back makes the next one wait
+//! twice as long, up to a minute.
 //!
-//! Decisions depend on measured times and on nothing else that a replay would not have, so they are recorded, and a session with
-//! [`Governor::Replay`] makes the same motion bit for bit.
+//! Decisions depend on measured times and on nothing else that a replay would not have, so they are
+//! recorded, and a session with [`Governor::Replay`] makes the same motion bit for bit.
 //!
 //! | file | what |
 //! |---|---|
@@ -40,20 +43,34 @@ use std::sync::Arc;
 /// Who chooses the sampler of each block.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Governor {
-    /// The caller: [`super::SessionOptions::sampler`] and [`super::Session::set_sampler`] alone. The sampler is pinned.
+    /// The caller: [`super::SessionOptions::sampler`] and [`super::Session::set_sampler`] alone.
+    /// The sampler is pinned.
     #[default]
     Off,
     /// The governor, from measured block times. The session's sampler is the best that it uses.
     Budget(Budget),
-    /// The decisions of an earlier session, in ascending order of blocks; a decision holds until the next one. Before the first
-    /// one, and where a decision's sampler is not supported, the session's sampler is used.
+    /// The decisions of an earlier session, in ascending order of blocks; a decision holds until
+    /// the next one. Before the first one, and where a decision's sampler is not supported, the
+    /// session's sampler is used.
     Replay(Arc<[Decision]>),
+}
+
+impl Governor {
+    /// A governor with a budget of `milliseconds` a block, or none for 0: what languages without
+    /// this type pass.
+    pub fn within(milliseconds: f32) -> Self {
+        if milliseconds == 0.0 {
+            return Self::Off;
+        }
+        Self::Budget(Budget { milliseconds, ..Budget::default() })
+    }
 }
 
 /// What a governed session may spend.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Budget {
-    /// Time that a block may take, milliseconds, 1 to 133.3 (a block's own length): later is a missed deadline.
+    /// Time that a block may take, milliseconds, 1 to 133.3 (a block's own length): later is a
+    /// missed deadline.
     pub milliseconds: f32,
     /// Whether `midpoint1` is a rung above the single step.
     pub coarse: bool,

@@ -23,7 +23,8 @@ const LATE: u32 = 3;
 const REHEARSE: [u32; 2] = [8, 64];
 /// Passes for catching up in one block, at most.
 const PASSES: u8 = 4;
-/// A slot of a cheaper rung is brought up to date when it lacks so many tokens, which one pass does.
+/// A slot of a cheaper rung is brought up to date when it lacks so many tokens, which one pass
+/// does.
 const BEHIND: u64 = 7;
 
 /// What the next block would cost, in units of work; rungs as on the ladder, best first.
@@ -62,13 +63,13 @@ pub(in crate::session) struct Policy {
 impl Policy {
     /// A ladder from `best` down; `student` tells whether there is a single step.
     pub(in crate::session) fn new(budget: &Budget, best: Sampler, student: bool) -> Self {
-        let all = [Sampler::Midpoint(4), Sampler::Midpoint(2), Sampler::Midpoint(1), Sampler::Single];
+        let all = [Sampler::Midpoint4, Sampler::Midpoint2, Sampler::Midpoint1, Sampler::Single];
         let mut ladder = [best; RUNGS];
         let mut len = 1;
         for sampler in all {
             let usable = match sampler {
                 Sampler::Single => student,
-                Sampler::Midpoint(1) => budget.coarse || !student,
+                Sampler::Midpoint1 => budget.coarse || !student,
                 _ => true,
             };
             if usable && sampler.evaluations() < best.evaluations() {

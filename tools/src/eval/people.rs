@@ -1,4 +1,5 @@
-//! The agent beside real people: at rest with a user who stands and says nothing, listening and speaking.
+//! The agent beside real people: at rest with a user who stands and says nothing, listening and
+//! speaking.
 
 use super::clip::{Clip, Segment};
 use super::motion::generate;
@@ -11,7 +12,8 @@ use std::sync::Arc;
 use visavis::internals::frame::FRAME_SAMPLES;
 use visavis::{Engine, Error, ErrorKind, FPS, Frame, Result, Rig, SessionOptions};
 
-/// Statistics of recorded people, made by `python -m visavis_train.corpus.people` from recordings that are not part of this repository.
+/// Statistics of recorded people, made by `python -m visavis_train.corpus.people` from recordings
+/// that are not part of this repository.
 const PEOPLE: &str = include_str!("people.json");
 /// Silent sessions that are averaged, and the seconds of each: eight minutes.
 const RUNS: usize = 4;
@@ -52,7 +54,8 @@ impl Real {
     }
 }
 
-/// Which of `frames` frames are speech: the voice's, with short pauses filled. No voice says nothing.
+/// Which of `frames` frames are speech: the voice's, with short pauses filled. No voice says
+/// nothing.
 pub(super) fn speech(voice: Option<Vec<f32>>, frames: usize) -> Vec<bool> {
     let mut speech = voice.map_or_else(|| vec![false; frames], |voice| speech_frames(&voice, frames));
     let mut last = None;
@@ -68,7 +71,8 @@ pub(super) fn speech(voice: Option<Vec<f32>>, frames: usize) -> Vec<bool> {
 }
 
 impl Idle {
-    /// What the agents of conversation clips do while nobody speaks and the user stands; `None` where no clip is a conversation.
+    /// What the agents of conversation clips do while nobody speaks and the user stands; `None`
+    /// where no clip is a conversation.
     pub(super) fn of_clips(rig: &Rig, clips: &[Clip]) -> Result<Option<Self>> {
         let mut tally = Tally::default();
         for clip in clips {

@@ -14,7 +14,8 @@ struct Table {
 impl Report {
     /// Pretty-printed JSON with a final newline.
     pub fn to_json(&self) -> String {
-        // Only maps with keys that are no strings and failing writers make this fail; there is neither.
+        // Only maps with keys that are no strings and failing writers make this fail; there is
+        // neither.
         serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
     }
 

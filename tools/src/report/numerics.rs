@@ -1,4 +1,5 @@
-//! Numbers that depend on the bundles alone, not on the machine: tensors, layer outputs, teacher-forced blocks.
+//! Numbers that depend on the bundles alone, not on the machine: tensors, layer outputs,
+//! teacher-forced blocks.
 
 use super::spread::{Spread, cosine, sqnr};
 use serde::{Deserialize, Serialize};
@@ -117,7 +118,7 @@ pub(super) fn measure(
     progress: &dyn Fn(&str),
 ) -> Result<Numerics> {
     let student = reference.engine.config().student.map(|_| visavis::Sampler::Single);
-    let samplers = [Some(visavis::Sampler::Midpoint(4)), student];
+    let samplers = [Some(visavis::Sampler::Midpoint4), student];
     let mut activations = Some(Activations::new(ROWS, 5));
     let mut teachers = Vec::new();
     for sampler in samplers.into_iter().flatten() {

@@ -3,21 +3,23 @@
 use super::{Voices, script::Script};
 use crate::metrics::switch_seam;
 use std::sync::Arc;
-use visavis::{Decision, Engine, Governor, Hold, Plan, Result, Sampler, SessionOptions};
+use visavis::replay::{Decision, Hold, Plan};
+use visavis::{Engine, Governor, Result, Sampler, SessionOptions};
 
 /// Blocks between two switches.
 const STAY: u64 = 6;
 /// Switches of a soak.
 pub(super) const SWITCHES: u64 = 120;
 
-/// Seam metric at `switches` switches of a session that goes up and down a governor's ladder, a step every 0.8 s, in a conversation;
-/// `None` where nothing moves. Slots are up to date when they are climbed to, as the governor sees to it: it changes time, not motion.
+/// Seam metric at `switches` switches of a session that goes up and down a governor's ladder, a
+/// step every 0.8 s, in a conversation; `None` where nothing moves. Slots are up to date when they
+/// are climbed to, as the governor sees to it: it changes time, not motion.
 ///
 /// # Errors
 /// Those of a session.
 pub(super) fn measure(engine: &Arc<Engine>, voices: &Voices, switches: u64) -> Result<Option<f64>> {
-    let last = if engine.config().student.is_some() { Sampler::Single } else { Sampler::Midpoint(1) };
-    let ladder = [Sampler::Midpoint(4), Sampler::Midpoint(2), last, Sampler::Midpoint(2)];
+    let last = if engine.config().student.is_some() { Sampler::Single } else { Sampler::Midpoint1 };
+    let ladder = [Sampler::Midpoint4, Sampler::Midpoint2, last, Sampler::Midpoint2];
     let plan = |i: u64| Decision {
         block: i * STAY,
         plan: Plan { sampler: ladder[i as usize % 4], catch_up: None, anchor: true, hold: Hold::No },
@@ -26,7 +28,7 @@ pub(super) fn measure(engine: &Arc<Engine>, voices: &Voices, switches: u64) -> R
     let options = SessionOptions { governor, gaze: Some(0.8), ..SessionOptions::default() };
     let mut session = engine.session(options)?;
     let blocks = STAY * (switches + 1);
-    let mut script = Script::new(voices, engine, Sampler::Midpoint(4), blocks).of_one_sampler();
+    let mut script = Script::new(voices, engine, Sampler::Midpoint4, blocks).of_one_sampler();
     let mut frames = Vec::new();
     for block in 0..blocks {
         script.block(&mut session, block)?;

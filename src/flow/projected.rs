@@ -1,0 +1,49 @@
+//! Projected conditioning of the last tokens: the same for every slot of a network, so it is
+//! computed once per token.
+
+/// A ring of tokens, `[token % capacity][2][width]`: without a guided gaze target, and with it.
+#[derive(Debug)]
+pub(super) struct Projected {
+    values: Vec<f32>,
+    width: usize,
+    capacity: u64,
+    /// Tokens before this are there, the last `capacity` of them.
+    end: u64,
+}
+
+impl Projected {
+    /// Room for the last `capacity` tokens.
+    pub(super) fn new(capacity: u64, width: usize) -> Self {
+        Self { values: vec![0.0; capacity as usize * 2 * width], width, capacity, end: 0 }
+    }
+
+    /// Forgets all tokens; the next one has the index `next`.
+    pub(super) fn forget(&mut self, next: u64) {
+        self.end = next;
+    }
+
+    /// Forgets tokens from `token` on.
+    pub(super) fn forget_from(&mut self, token: u64) {
+        self.end = self.end.min(token);
+    }
+
+    /// Where `token` is to be projected to, `[2, width]`, unless it has been; tokens come in order.
+    pub(super) fn missing(&mut self, token: u64) -> Option<&mut [f32]> {
+        if token < self.end && token + self.capacity > self.end {
+            return None;
+        }
+        self.end = token + 1;
+        let at = self.at(token);
+        Some(&mut self.values[at..][..2 * self.width])
+    }
+
+    /// The two vectors of `token`.
+    pub(super) fn of(&self, token: u64) -> [&[f32]; 2] {
+        let (without, with) = self.values[self.at(token)..][..2 * self.width].split_at(self.width);
+        [without, with]
+    }
+
+    fn at(&self, token: u64) -> usize {
+        (token % self.capacity) as usize * 2 * self.width
+    }
+}

@@ -1,7 +1,0 @@
-use super::scalar::body;
-use super::{Finish, Sums};
-
-#[target_feature(enable = "avx2,fma,f16c")]
-pub(super) fn run(sums: Sums<'_>, bias: &[f32], finish: Finish<'_>, y: &mut [f32]) {
-    body(sums, bias, finish, y);
-}

@@ -1,6 +1,0 @@
-use super::scalar::body;
-
-#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,f16c")]
-pub(super) fn run(m: &[[f32; 9]], out: &mut [[f32; 9]]) {
-    body(m, out);
-}

@@ -1,6 +1,0 @@
-use super::scalar::body;
-
-#[target_feature(enable = "neon")]
-pub(super) fn run(x: &[f32], q: &mut [i8], sums: &mut [i32]) -> f32 {
-    body(x, q, sums)
-}

@@ -1,0 +1,82 @@
+//! The one way from what was pushed to frames, for a session and for a team: a session alone is a
+//! team of one.
+//!
+//! ```text
+//! listen -> begin (conditioning, noise) -> sample (passes shared) -> decode -> re-anchor -> pose
+//! ```
+//!
+//! With one block both threads work in each of its layers; with several, what belongs to one of
+//! them alone goes to one thread.
+
+use super::block::{Block, Posing};
+use super::inputs::{Listening, listen};
+use super::tools::Tools;
+use crate::flow::{SHARED_ROWS, sample};
+
+/// Blocks that go through the networks together, at most: two rows each is the least.
+pub(super) const MEMBERS: usize = SHARED_ROWS / 2;
+
+/// Computes `blocks`, each into the frames of its session, or holds its last pose. Several of them
+/// are of one engine and can share passes ([`sample`]). Returns how many went through the networks.
+///
+/// Allocates nothing, takes no lock, makes no system call (`tests/sanitize.sh realtime` has the
+/// sanitizer watch this function).
+#[cfg_attr(visavis_rtsan, sanitize(realtime = "nonblocking"))]
+pub(super) fn compute(tools: &mut Tools<'_>, blocks: &mut [Option<Block<'_>>]) -> usize {
+    debug_assert!(blocks.len() <= MEMBERS);
+    let engine = tools.engine;
+    hear(tools, blocks);
+    for block in blocks.iter_mut().flatten() {
+        if block.moves() { block.begin(engine) } else { block.hold(tools) }
+    }
+    sample(
+        &mut tools.flow(),
+        blocks,
+        |block| moving(block).map(Block::generator),
+        |block| {
+            moving(block).into_iter().for_each(Block::evaluated);
+        },
+    );
+    for block in blocks.iter_mut().filter_map(moving) {
+        block.take_latent(engine);
+    }
+    engine.decoder.step_all(tools.exec, &mut tools.work.vae, blocks, |block| moving(block).map(Block::decoding));
+    for block in blocks.iter_mut().filter_map(moving) {
+        block.decoded(tools);
+    }
+    let count = pose(tools, blocks);
+    blocks.iter_mut().flatten().for_each(Block::end);
+    count
+}
+
+/// The block, if it has motion to be computed.
+fn moving<'a, 'b>(block: &'a mut Option<Block<'b>>) -> Option<&'a mut Block<'b>> {
+    block.as_mut().filter(|block| block.moves())
+}
+
+/// All voices listen.
+fn hear(tools: &mut Tools<'_>, blocks: &mut [Option<Block<'_>>]) {
+    let mut voices: [[Listening<'_>; 2]; MEMBERS] = [const { [const { None }; 2] }; MEMBERS];
+    let mut count = 0;
+    for block in blocks.iter_mut().filter_map(moving) {
+        voices[count] = block.voices();
+        count += 1;
+    }
+    listen(tools.exec, tools.engine, voices[..count].as_flattened_mut());
+}
+
+/// What was decoded becomes frames; returns the number of blocks.
+fn pose(tools: &mut Tools<'_>, blocks: &mut [Option<Block<'_>>]) -> usize {
+    let mut posing: [Option<Posing<'_>>; MEMBERS] = [const { None }; MEMBERS];
+    let mut count = 0;
+    for block in blocks.iter_mut().filter_map(moving) {
+        posing[count] = Some(block.posing());
+        count += 1;
+    }
+    let (engine, pool) = (tools.engine, tools.exec.pool_mut());
+    match &mut posing[..count] {
+        [one] => one.iter_mut().for_each(|posing| posing.run(Some(&mut *pool), engine)),
+        several => pool.each(several, |_, posing| posing.iter_mut().for_each(|posing| posing.run(None, engine))),
+    }
+    count
+}

@@ -1,0 +1,122 @@
+//! What a bundle holds, for people (`visavis inspect`).
+
+use serde::Serialize;
+use std::fmt;
+use visavis::internals::bundle::TensorInfo;
+use visavis::internals::config::Config;
+use visavis::internals::kernels::Scheme;
+use visavis::{BundleFile, Result};
+
+/// A bundle's config and tensor list; `Display` prints the summary that `visavis inspect` shows.
+#[derive(Debug, Clone, Serialize)]
+pub struct Contents {
+    /// Size of the file, bytes.
+    pub bytes: usize,
+    /// The configuration.
+    pub config: Config,
+    /// Tensors, sorted by name.
+    pub tensors: Vec<TensorInfo>,
+}
+
+/// Parts of a bundle: name prefix and what it is.
+const PARTS: [(&str, &str); 7] = [
+    ("audio.", "audio encoder"),
+    ("vae.encoder.", "VAE encoder"),
+    ("vae.decoder.", "VAE decoder"),
+    ("flow.", "flow transformer"),
+    ("student.", "single-step student"),
+    ("stats.", "normalisation"),
+    ("idle.", "idle clip"),
+];
+
+impl Contents {
+    /// Reads the summary of `file`; weights are not looked at.
+    ///
+    /// # Errors
+    /// As [`BundleFile::parse`].
+    pub fn of(file: &BundleFile<'_>) -> Result<Self> {
+        let (config, tensors) = file.parse()?;
+        Ok(Self { bytes: file.len(), config, tensors: tensors.infos() })
+    }
+}
+
+impl fmt::Display for Contents {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let c = &self.config;
+        writeln!(f, "{} (format {}, {:.1} MB)", c.name, c.format, self.bytes as f64 / 1e6)?;
+        writeln!(f, "  {}\n", c.description)?;
+        writeln!(f, "  part                  tensors   parameters        bytes  storage")?;
+        for (prefix, title) in PARTS {
+            let part: Vec<_> = self.tensors.iter().filter(|t| t.name.starts_with(prefix)).collect();
+            if part.is_empty() {
+                continue;
+            }
+            let mut dtypes: Vec<_> = part.iter().map(|t| t.dtype.as_str()).collect();
+            dtypes.sort_unstable();
+            dtypes.dedup();
+            let (elements, bytes) = part.iter().fold((0, 0), |(e, b), t| (e + t.elements(), b + t.bytes));
+            writeln!(f, "  {title:<20} {:>8} {elements:>12} {bytes:>12}  {}", part.len(), dtypes.join(", "))?;
+        }
+        if let Some(q) = &c.quantisation {
+            let count = |scheme| q.tensors.values().filter(|s| **s == scheme).count();
+            let schemes = [Scheme::I4, Scheme::I8, Scheme::F16, Scheme::F32].map(|s| (s, count(s)));
+            let list: Vec<_> =
+                schemes.iter().filter(|(_, n)| *n > 0).map(|(s, n)| format!("{n} matrices {s}")).collect();
+            writeln!(f, "\n  quantised to {}: {}", q.scheme, list.join(", "))?;
+        }
+        let stack: Vec<_> = c.audio.layers.iter().map(|l| format!("{}/{}", l.outputs, l.stride)).collect();
+        writeln!(
+            f,
+            "\n  audio    24 kHz, convolutions (channels/stride) {}, {} features",
+            stack.join(" "),
+            c.audio.features
+        )?;
+        let v = &c.vae;
+        writeln!(
+            f,
+            "  VAE      {} + {} layers of width {}, {} heads, latent {}, window {} blocks",
+            v.layers, v.layers, v.width, v.heads, v.latent, v.window_blocks
+        )?;
+        let w = &c.flow;
+        writeln!(
+            f,
+            "  flow     {} layers of width {}, {} heads, window {} blocks ({:.1} s)",
+            w.layers,
+            w.width,
+            w.heads,
+            w.window_blocks,
+            w.window_blocks as f64 * 4.0 / 30.0
+        )?;
+        match c.student {
+            Some(s) => writeln!(
+                f,
+                "  student  single step, history at tau {}, guidance {} and gaze guidance {} distilled in",
+                s.tau_history, s.guidance, s.gaze_guidance
+            )?,
+            None => writeln!(f, "  student  none: the sampler \"single\" is not available")?,
+        }
+        match &c.gaze {
+            Some(g) => writeln!(
+                f,
+                "  gaze     calibrated; free gaze {:.2} to {:.2} in stretches of {:.1} s",
+                g.levels.iter().copied().fold(f32::INFINITY, f32::min),
+                g.levels.iter().copied().fold(f32::NEG_INFINITY, f32::max),
+                g.seconds
+            )?,
+            None => {
+                writeln!(f, "  gaze     not calibrated: targets are values of the gaze channel (`visavis calibrate`)")?
+            }
+        }
+        writeln!(
+            f,
+            "  delays   in blocks of 133.3 ms: user {}, agent's own voice {}",
+            c.user_delay_blocks, c.agent_delay_blocks
+        )?;
+        writeln!(f, "  rig      {} joints: {}", c.rig.joints.len(), joint_list(c))?;
+        writeln!(f, "\n  licence  {}", c.licence)
+    }
+}
+
+fn joint_list(config: &Config) -> String {
+    config.rig.joints.iter().map(|j| j.name.as_str()).collect::<Vec<_>>().join(" ")
+}
