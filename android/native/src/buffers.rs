@@ -116,8 +116,8 @@ mod tests {
                 });
             }
             scope.spawn(|| {
-                for i in 0..2_000 {
-                    buffer[i].store(0.25f32.to_bits(), Relaxed);
+                for number in &buffer[..2_000] {
+                    number.store(0.25f32.to_bits(), Relaxed);
                 }
             });
             for _ in 0..4 {
