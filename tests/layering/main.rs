@@ -48,7 +48,7 @@ const ROOMS: &[(&str, &str, &[&str])] = &[
 const FRONT: &[&str] = &["internals", "openxr", "replay", "stats", "threads"];
 
 /// Circles among the files of a room that are still to be broken up.
-const CIRCLES: &[(&str, &[&str])] = &[("kernels", &["exec", "linear"])];
+const CIRCLES: &[(&str, &[&str])] = &[];
 
 fn library() -> Modules {
     Modules::read(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/src/lib.rs")))
