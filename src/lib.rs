@@ -1,8 +1,8 @@
-//! A runtime that gives a virtual agent a body: full-body motion that talks, listens, turns to the person in front of it
-//! and keeps as much eye contact as it is told to.
+//! A runtime that gives a virtual agent a body: full-body motion that talks, listens, turns to the
+//! person in front of it and keeps as much eye contact as it is told to.
 //!
-//! It hears the agent's and the user's voice, sees where the user's head is, and streams poses at 30 frames a second:
-//! causal, offline, on one or two CPU cores.
+//! It hears the agent's and the user's voice, sees where the user's head is, and streams poses at
+//! 30 frames a second: causal, offline, on one or two CPU cores.
 //!
 //! ```no_run
 //! use visavis::{Engine, SessionOptions};
@@ -23,6 +23,10 @@
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! Voices, head positions and settings may come from other threads, by [`Session::voice_input`],
+//! [`Session::head_input`] and [`Session::controls`]. Whoever pushes never waits for a block, and
+//! the same inputs give the same motion, whichever threads they come from.
 #![cfg_attr(visavis_rtsan, feature(sanitize))]
 #![cfg_attr(
     not(feature = "internals"),
@@ -46,20 +50,22 @@ mod par;
 mod pose;
 #[cfg(feature = "quant")]
 mod quant;
+mod queue;
 mod rig;
 mod scheme;
 mod session;
 mod user;
 mod vae;
 
-pub use audio::Voice;
+pub use audio::{Speaker, VoiceInput};
 pub use bundle::{BundleFile, LoadMode};
 pub use engine::{Engine, Networks};
 pub use error::{Error, ErrorKind, Result};
 pub use frame::{BLOCK_FRAMES, EulerSteps, FPS, Frame, Root, SAMPLE_RATE, Sampler, Transform};
 pub use glam;
 pub use rig::{Joint, Rig};
-pub use session::{Budget, Decision, Governor, Hold, Plan, Session, SessionOptions, Team};
+pub use session::{Budget, Controls, Decision, Governor, Hold, Plan, Session, SessionOptions, SharedSession, Team};
+pub use user::HeadInput;
 
 /// What a session counts and measures ([`Session::stats`]).
 pub mod stats {
@@ -79,8 +85,8 @@ pub mod threads {
     pub use crate::par::{current_thread_id, pin_current_thread};
 }
 
-/// The rooms of this crate, for its own tools, tests, benchmarks and fuzz targets. Nothing in here keeps its shape from one
-/// version to the next, patches included.
+/// The rooms of this crate, for its own tools, tests, benchmarks and fuzz targets. Nothing in here
+/// keeps its shape from one version to the next, patches included.
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod internals {

@@ -1,7 +1,9 @@
 //! The person in front of the agent: a head position at any rate, asked for at frame times.
 
+mod input;
 mod track;
 
+pub use input::HeadInput;
 pub use track::{HeadTrack, Presence, TrackStats, UserSample};
 
 /// A position is held for this long after the last one that came; then the user is absent. Seconds.

@@ -55,6 +55,17 @@ pub enum Governor {
     Replay(Arc<[Decision]>),
 }
 
+impl Governor {
+    /// A governor with a budget of `milliseconds` a block, or none for 0: what languages without
+    /// this type pass.
+    pub fn within(milliseconds: f32) -> Self {
+        if milliseconds == 0.0 {
+            return Self::Off;
+        }
+        Self::Budget(Budget { milliseconds, ..Budget::default() })
+    }
+}
+
 /// What a governed session may spend.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Budget {

@@ -7,10 +7,12 @@
 //! Speed does not depend on what weights hold, so sizes for which there is no trained bundle are measured with seeded ones
 //! ([`Size::engine`]). What a machine's memory gives is measured in the same run, because the time of a block is mostly that of reading weights.
 
+mod load;
 mod machine;
 mod sizes;
 mod stages;
 
+pub use load::{LoadOptions, Times, UnderLoad};
 pub use machine::{Machine, memory, read_limit};
 pub use sizes::Size;
 pub use stages::{STAGES, StageTimes};

@@ -30,6 +30,7 @@ mod figures;
 mod made_up;
 mod motion;
 mod parallel;
+mod people;
 mod reaction;
 mod reconstruction;
 mod report;
@@ -42,6 +43,7 @@ pub use clip::{Clip, Segment};
 pub use endurance::{Change, Endurance, Follow};
 pub use figures::{CORRECT, Figures, Row};
 pub use made_up::made_up;
+pub use people::Idle;
 pub use reaction::{FOUND, PATIENCE, Reaction};
 pub use reconstruction::Reconstruction;
 pub use targets::Verdict;
@@ -119,6 +121,10 @@ pub struct Report {
     pub bank: String,
     /// `corpus`, `Random`, `NN` (these two where they were asked for), then the samplers with free gaze, then the gaze targets.
     pub rows: Vec<Row>,
+    /// Nobody speaks and the user stands: `real people`, `corpus` where it has such stretches, then the samplers.
+    pub idle: Vec<Idle>,
+    /// How lively real people are who talk.
+    pub real_talk: crate::metrics::Liveliness,
     /// The gaze dial of the first sampler and of the single step.
     pub dials: Vec<Dial>,
     /// What the autoencoder loses.
@@ -191,6 +197,16 @@ pub fn evaluate(
         rows.extend(dialled);
     }
 
+    tell("at rest");
+    let real = people::Real::read()?;
+    let mut idle = vec![Idle { name: "real people".into(), figures: real.idle }];
+    idle.extend(Idle::of_clips(&engine.config().rig, clips)?);
+    for &sampler in &samplers {
+        let seed = u64::from(options.seed) << 32;
+        let session = SessionOptions { sampler, gaze: None, seed, ..options.session.clone() };
+        idle.push(Idle::of_sessions(engine, &session, options.threads, options.quick)?);
+    }
+
     let session = SessionOptions { sampler: samplers[0], gaze: None, ..options.session.clone() };
     let (threads, quick) = (options.threads, options.quick);
     tell("reconstruction");
@@ -211,6 +227,8 @@ pub fn evaluate(
         quick,
         bank: searched,
         rows,
+        idle,
+        real_talk: real.speaking,
         dials,
         reconstruction,
         reaction,

@@ -16,6 +16,8 @@
 //! | beat | [`beat`] | ours |
 //! | APE, PCK | [`ape`], [`pck`] | DRAM eq. 10, 11 |
 //! | bone length deviation | [`bone_deviation`] | ours |
+//! | stillness, sway and so on | [`Tally`] | recorded people |
+//! | nods | [`NodTally`] | recorded people |
 //! | joint speed | [`joint_speed`] | ours |
 //! | speaking / non-speaking | [`speech_frames`], [`is_speaking`] | SARAH 4 |
 
@@ -26,7 +28,9 @@ mod frechet;
 mod gaze;
 mod keypoints;
 mod linalg;
+mod liveliness;
 mod moments;
+mod nods;
 mod seam;
 mod speech;
 mod speed;
@@ -40,7 +44,9 @@ pub use feet::{CONTACT_HEIGHT, SLIDE_SPEED, foot_clearances, foot_slide, support
 pub use frechet::frechet;
 pub use gaze::{gaze_score, gaze_scores, head_angle};
 pub use keypoints::{Space, ape, pck};
+pub use liveliness::{BANDS, Liveliness, Tally};
 pub use moments::{Moments, acceleration_moments, pose_moments};
+pub use nods::{NodTally, Nods};
 pub use seam::{seam, switch_seam};
 pub use speech::{envelope, is_speaking, speech_frames};
 pub use speed::{JointSpeed, joint_speed, wrist_speed, wrist_speeds};

@@ -1,7 +1,7 @@
 //! What happens when in a cycle.
 
 use glam::Vec3;
-use visavis::{BLOCK_FRAMES, Engine, Error, ErrorKind, FPS, Result, Root, SAMPLE_RATE, Sampler, Session};
+use visavis::{BLOCK_FRAMES, Engine, Error, ErrorKind, FPS, Result, Root, SAMPLE_RATE, Sampler, Session, Speaker};
 
 /// What agent and user say, 24 kHz mono, repeated without end.
 #[derive(Debug, Clone, PartialEq)]
@@ -97,7 +97,7 @@ impl<'a> Script<'a> {
             session.set_gaze(GAZES[part as usize % GAZES.len()])?;
             let cheap = self.student && (14..16).contains(&part);
             session.set_sampler(if cheap { Sampler::Single } else { self.sampler })?;
-            session.user_voice().set_present(part != 9);
+            session.voice_input(Speaker::User).set_present(part != 9);
         }
         let quiet = part == 6 || part == 17;
         let seconds = BLOCK_FRAMES as f64 / f64::from(FPS);

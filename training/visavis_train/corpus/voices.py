@@ -208,7 +208,7 @@ def compose(rng, voices, frames, talk_share=0.5):
                 break
             t += min(0.15 + rng.gamma(2.0, 0.16), 1.0)
         r = rng.random()
-        t += rng.uniform(1.5, 4.5) if r < 0.1 else np.clip(rng.normal(0.2, 0.25), -0.45, 1.2)
+        t += rng.uniform(8.0, 30.0) if r < 0.04 else rng.uniform(1.5, 4.5) if r < 0.12 else np.clip(rng.normal(0.2, 0.25), -0.45, 1.2)
         k = 1 - k
     for p in phrases:
         p.sort()
