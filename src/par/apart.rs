@@ -1,8 +1,9 @@
 //! A helper thread kept off the core that its caller is on.
 //!
-//! A scheduler may wake a thread on its waker's core even beside an idle one (Linux does so two times of three on a machine of
-//! two cores), and leave both there until its next tick, milliseconds later. So before the caller wakes the helper, the
-//! caller's core is taken out of those that the helper may use.
+//! A scheduler may wake a thread on its waker's core even beside an idle one (Linux does so two
+//! times of three on a machine of two cores), and leave both there until its next tick,
+//! milliseconds later. So before the caller wakes the helper, the caller's core is taken out of
+//! those that the helper may use.
 
 #[cfg(any(target_os = "linux", target_os = "android"))]
 pub(super) use linux::Apart;
@@ -40,7 +41,8 @@ mod linux {
 
         /// Takes the calling thread's core out of the helper's, unless it has no other.
         ///
-        /// Two system calls that read, and one that writes when the caller is on another core than last time.
+        /// Two system calls that read, and one that writes when the caller is on another core than
+        /// last time.
         pub(in crate::par) fn keep(&mut self) {
             let Some(id) = self.id.and_then(|id| Pid::from_raw(i32::try_from(id).ok()?)) else { return };
             let Some(all) = self.chosen.or_else(|| sched_getaffinity(None).ok()) else { return };
@@ -53,7 +55,8 @@ mod linux {
             if core < CpuSet::MAX_CPU {
                 rest.unset(core);
             }
-            // Where it fails, as when a caller that is pinned to one core leaves none, the helper stays where it may be.
+            // Where it fails, as when a caller that is pinned to one core leaves none, the helper
+            // stays where it may be.
             if rest.count() > 0 {
                 let _ = sched_setaffinity(Some(id), &rest);
             }

@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use crate::error::{Error, ErrorKind, Result};
 
-/// The kernel's id of the calling thread (`gettid`), as Android's performance hints take it; `None` where there is no such id.
+/// The kernel's id of the calling thread (`gettid`), as Android's performance hints take it; `None`
+/// where there is no such id.
 pub fn current_thread_id() -> Option<u32> {
     #[cfg(any(target_os = "linux", target_os = "android"))]
     return u32::try_from(rustix::thread::gettid().as_raw_nonzero().get()).ok();
@@ -15,7 +16,8 @@ pub fn current_thread_id() -> Option<u32> {
 /// Lets the calling thread run only on the cores of `mask` (bit i: core i).
 ///
 /// # Errors
-/// [`ErrorKind::Argument`] for a mask without any core that this process may use, and on systems other than Linux and Android.
+/// [`ErrorKind::Argument`] for a mask without any core that this process may use, and on systems
+/// other than Linux and Android.
 pub fn pin_current_thread(mask: u64) -> Result<()> {
     pin(None, mask)
 }
@@ -44,7 +46,8 @@ pub(super) fn cores_of(mask: u64) -> rustix::thread::CpuSet {
     set
 }
 
-/// For how long the calling thread has had a core so far; the time since an arbitrary moment on systems that do not tell.
+/// For how long the calling thread has had a core so far; the time since an arbitrary moment on
+/// systems that do not tell.
 pub(super) fn time_on_core() -> Duration {
     #[cfg(any(target_os = "linux", target_os = "android"))]
     {

@@ -1,14 +1,17 @@
-//! Whether the helper pays: what it saves, against what waiting for it and for a core beside it costs.
+//! Whether the helper pays: what it saves, against what waiting for it and for a core beside it
+//! costs.
 //!
-//! Where other work wants the cores, a thread that loses its own in the middle of a piece comes back a slice of the
-//! scheduler later, milliseconds in which the other one can do nothing; and a helper that spins may be the very thread
-//! that the caller lost its core to. So what the helper saves is credited to it and what is lost is taken off. A helper in
-//! debt sits out for a time in proportion to the debt, which bounds what trying it again may cost; that time doubles with
-//! each trial that fails.
+//! Where other work wants the cores, a thread that loses its own in the middle of a piece comes
+//! back a slice of the scheduler later, milliseconds in which the other one can do nothing; and a
+//! helper that spins may be the very thread that the caller lost its core to. So what the helper
+//! saves is credited to it and what is lost is taken off. A helper in debt sits out for a time in
+//! proportion to the debt, which bounds what trying it again may cost; that time doubles with each
+//! trial that fails.
 
 use std::time::Duration;
 
-/// What the helper may have saved up, ns: about a scheduler's slice, so that a quiet machine's odd stall is forgiven.
+/// What the helper may have saved up, ns: about a scheduler's slice, so that a quiet machine's odd
+/// stall is forgiven.
 const CREDIT: i64 = 4_000_000;
 /// Time to be computed alone for each unit of debt.
 const ALONE: i64 = 40;
@@ -68,13 +71,13 @@ impl Ledger {
             return;
         }
         let lost = nanos(stretch.off.saturating_add(stretch.waited)).min(elapsed);
-        // The threads share memory's bandwidth: alone, the caller would have taken about half as long for the helper's pieces
-        // as for as many of its own.
+        // The threads share memory's bandwidth: alone, the caller would have taken about half as
+        // long for the helper's pieces as for as many of its own.
         let own = (stretch.pieces - stretch.helped).max(1);
         let saved = (elapsed - lost) as f64 * stretch.helped as f64 / own as f64 / 2.0;
         self.credit = (self.credit.saturating_add(saved as i64) - lost).min(CREDIT);
         if self.credit < 0 {
-            self.alone = self.credit.max(-CREDIT) * -ALONE << self.doublings;
+            self.alone = (self.credit.max(-CREDIT) * -ALONE) << self.doublings;
             self.stretches = STRETCHES;
             self.doublings = DOUBLINGS.min(self.doublings + 1);
             self.credit = 0;

@@ -18,7 +18,8 @@ const MAX_PIECES: usize = u16::MAX as usize;
 
 /// Spins at the end of a run after which the caller's wait for the helper is timed.
 const PATIENCE: u32 = 1 << 10;
-/// Spins after which the caller lets another thread have its core; about a millisecond, reached only where the helper lost its own.
+/// Spins after which the caller lets another thread have its core; about a millisecond, reached
+/// only where the helper lost its own.
 const SPINS: u32 = 1 << 15;
 
 /// One or two threads that share out the pieces of a loop.
@@ -41,7 +42,8 @@ struct Helper {
 }
 
 impl Pool {
-    /// A pool of `threads` threads, the caller included: 1 starts none, 2 (or more) starts one helper, parked.
+    /// A pool of `threads` threads, the caller included: 1 starts none, 2 (or more) starts one
+    /// helper, parked.
     ///
     /// # Errors
     /// When the operating system cannot start a thread.
@@ -67,18 +69,20 @@ impl Pool {
         1 + usize::from(self.helper.is_some())
     }
 
-    /// Whether the helper takes part from the next [`begin`](Self::begin) on: false without one, and while it costs more than
-    /// it saves.
+    /// Whether the helper takes part from the next [`begin`](Self::begin) on: false without one,
+    /// and while it costs more than it saves.
     pub fn together(&self) -> bool {
         self.helper.as_ref().is_some_and(|helper| helper.ledger.together())
     }
 
-    /// The kernel's id of the helper thread; `None` without a helper, or where threads have no such id.
+    /// The kernel's id of the helper thread; `None` without a helper, or where threads have no such
+    /// id.
     pub fn helper_id(&self) -> Option<u32> {
         self.helper.as_ref()?.id
     }
 
-    /// Lets the helper run only on the cores of `mask` (bit i: core i); does nothing without a helper.
+    /// Lets the helper run only on the cores of `mask` (bit i: core i); does nothing without a
+    /// helper.
     ///
     /// # Errors
     /// As [`super::pin_current_thread`].
@@ -86,9 +90,11 @@ impl Pool {
         self.helper.as_mut().map_or(Ok(()), |helper| helper.apart.choose(mask))
     }
 
-    /// Wakes the helper; from now until [`end`](Self::end) it looks for work: spinning, and in short naps when there is none for long.
+    /// Wakes the helper; from now until [`end`](Self::end) it looks for work: spinning, and in
+    /// short naps when there is none for long.
     ///
-    /// Where other work wants the cores, so that the helper costs more than it saves, it is left asleep.
+    /// Where other work wants the cores, so that the helper costs more than it saves, it is left
+    /// asleep.
     pub fn begin(&mut self) {
         let Some(helper) = &mut self.helper else { return };
         if helper.began.is_none() {
@@ -113,16 +119,18 @@ impl Pool {
         }
     }
 
-    /// Calls `work(i, next)` once for each i in `0..pieces`, here and on the helper if it is awake; returns when all have returned.
-    /// `next` is where the same thread goes on, unless the other one is faster.
+    /// Calls `work(i, next)` once for each i in `0..pieces`, here and on the helper if it is awake;
+    /// returns when all have returned. `next` is where the same thread goes on, unless the other
+    /// one is faster.
     ///
     /// # Panics
-    /// With the panic of a piece, after all pieces that were begun have ended. With more than 65,535 pieces.
+    /// With the panic of a piece, after all pieces that were begun have ended. With more than
+    /// 65,535 pieces.
     pub fn run(&mut self, pieces: usize, work: &(dyn Fn(usize, Next) + Sync)) {
-        let helper = self.helper.as_mut().map(|helper| {
+        if let Some(helper) = &mut self.helper {
             helper.stretch.pieces += pieces as u64;
-            helper
-        });
+        }
+        let helper = self.helper.as_mut();
         let shared = &*self.shared;
         let (Some(helper), true) = (helper, pieces > 1 && shared.awake.0.load(Ordering::Relaxed)) else {
             (0..pieces)
@@ -130,8 +138,9 @@ impl Pool {
             return;
         };
         assert!(pieces <= MAX_PIECES, "too many pieces");
-        // SAFETY: no piece of the last run is left or being worked on, so the helper does not read `work`. The lifetime is erased:
-        // the pointer is used only for pieces of this run, and this function does not return or unwind before they have ended.
+        // SAFETY: no piece of the last run is left or being worked on, so the helper does not read
+        // `work`. The lifetime is erased: the pointer is used only for pieces of this run, and this
+        // function does not return or unwind before they have ended.
         unsafe { *shared.work.get() = Some(std::mem::transmute::<*const Work<'_>, *const Work<'static>>(work)) };
         shared.done.0.store(0, Ordering::Relaxed);
         self.run = self.run.wrapping_add(1);
@@ -157,7 +166,8 @@ impl Pool {
         }
     }
 
-    /// Lets the helper sleep for `ms` before it takes the next piece, or with the next one that it takes.
+    /// Lets the helper sleep for `ms` before it takes the next piece, or with the next one that it
+    /// takes.
     #[cfg(test)]
     pub(crate) fn stall(&self, ms: u32, with_a_piece: bool) {
         self.shared.stalls[usize::from(with_a_piece)].store(ms, Ordering::Relaxed);
@@ -165,7 +175,8 @@ impl Pool {
 }
 
 impl Helper {
-    /// Waits until the helper has done `theirs` pieces. One that kept the caller waiting for too long leaves the stretch.
+    /// Waits until the helper has done `theirs` pieces. One that kept the caller waiting for too
+    /// long leaves the stretch.
     ///
     /// Nothing else can be done meanwhile: the helper's piece borrows what the run was given.
     fn wait(&mut self, shared: &Shared, theirs: u32) {

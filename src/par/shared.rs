@@ -10,8 +10,8 @@ use std::time::Duration;
 
 use super::FlushToZero;
 
-/// Spins without a piece after which the helper naps: well over what lies between two runs. A helper that finds nothing for longer
-/// may be what the caller waits for a core for.
+/// Spins without a piece after which the helper naps: well over what lies between two runs. A
+/// helper that finds nothing for longer may be what the caller waits for a core for.
 const IDLE: u32 = 1 << 14;
 /// How long a nap lasts.
 const NAP: Duration = Duration::from_micros(500);
@@ -44,22 +44,26 @@ pub(super) struct Shared {
     pub(super) awake: Line<AtomicBool>,
     pub(super) quit: AtomicBool,
     pub(super) panicked: AtomicBool,
-    /// The current work. Written by the caller while no piece is left; read by the helper between taking a piece and counting it.
+    /// The current work. Written by the caller while no piece is left; read by the helper between
+    /// taking a piece and counting it.
     pub(super) work: UnsafeCell<Option<*const Work<'static>>>,
     pub(super) payload: Mutex<Option<Box<dyn Any + Send>>>,
-    /// Milliseconds that the helper sleeps before it takes a piece, and with one that it has just taken; once.
+    /// Milliseconds that the helper sleeps before it takes a piece, and with one that it has just
+    /// taken; once.
     #[cfg(test)]
     pub(super) stalls: [AtomicU32; 2],
 }
 
-// SAFETY: `work` is the one field that is not Sync by itself; taking a piece acquires the caller's release of the ticket that
-// followed its write, and the caller writes again only after it has acquired the helper's count of every piece taken.
+// SAFETY: `work` is the one field that is not Sync by itself; taking a piece acquires the caller's
+// release of the ticket that followed its write, and the caller writes again only after it has
+// acquired the helper's count of every piece taken.
 unsafe impl Sync for Shared {}
 // SAFETY: the pointer in `work` is to a `Sync` closure that outlives the run.
 unsafe impl Send for Shared {}
 
 impl Shared {
-    /// Takes a piece of the current run, from the front or the back. Of two that are left the other thread takes the second.
+    /// Takes a piece of the current run, from the front or the back. Of two that are left the other
+    /// thread takes the second.
     pub(super) fn take(&self, front: bool) -> Option<(usize, Next)> {
         let mut seen = self.ticket.0.load(Ordering::Relaxed);
         loop {
@@ -106,7 +110,8 @@ impl Shared {
                 idle = 0;
                 #[cfg(test)]
                 self.stall(1);
-                // SAFETY: a taken piece keeps the caller in `run`, so `work` is set, not written to, and what it points to is alive.
+                // SAFETY: a taken piece keeps the caller in `run`, so `work` is set, not written
+                // to, and what it points to is alive.
                 let work = unsafe { (*self.work.get()).map(|w| &*w) };
                 let outcome = catch_unwind(AssertUnwindSafe(|| {
                     if let Some(work) = work {

@@ -80,7 +80,8 @@ fn panics_come_out_and_the_pool_lives_on() {
     assert_eq!(sum.into_inner(), 190);
 }
 
-/// What `rounds` runs of 20 pieces compute, each a stretch of its own; how many of them the helper had a part in.
+/// What `rounds` runs of 20 pieces compute, each a stretch of its own; how many of them the helper
+/// had a part in.
 fn stretches(pool: &mut Pool, rounds: usize) -> usize {
     let caller = thread::current().id();
     let mut helped = 0;

@@ -122,6 +122,7 @@ impl DecoderState {
 
     /// Takes back the last block, if there is one, so that the next one takes its place
     /// (teacher-forced comparisons).
+    #[cfg(feature = "internals")]
     pub fn back(&mut self) {
         self.0.back();
     }

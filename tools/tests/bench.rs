@@ -48,7 +48,8 @@ fn beside_other_work_one_and_two_threads_are_compared() {
     fails(2, &[&load[..], &["--threads", "1"]].concat());
 }
 
-/// The cold start of seeded weights: a bundle of them is written, loaded by processes of their own, and removed.
+/// The cold start of seeded weights: a bundle of them is written, loaded by processes of their own,
+/// and removed.
 #[test]
 fn seeded_sizes_start_from_a_file() {
     let dir = Scratch::new("bench");

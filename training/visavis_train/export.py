@@ -13,10 +13,9 @@ import torch
 
 from . import bundle, credits
 from .motion import rig
-from .nets.audio import AudioEncoder
-from .nets.flow import FlowNet
 from .train.cache import load_audio, load_vae
 from .train.data import clips, expand, load_motion
+from .train.flow import load_flow
 from .train.geometry import integrate, local_positions, to_world
 
 DESCRIPTION = ("Conversation motion of a standing agent, trained on a corpus simulated from real clips and real speech (no captured conversations). "
@@ -50,13 +49,6 @@ def idle_clip(corpus, split, n, limit=80, known=None):
         if cost[at] < best[0]:
             best = (float(cost[at]), expand(frames[at:at + n]), f"{path.split('/')[-1]}:{at}")
     return best[1], best[2]
-
-
-def load_flow(path):
-    state = torch.load(path, weights_only=False)
-    net = FlowNet(state["latent"], state["audio"], **state["size"])
-    net.load_state_dict(state["ema"])
-    return net.eval(), state
 
 
 def assemble(audio, vae_path, flow_path, student_path, idle, name, licence, session=None):

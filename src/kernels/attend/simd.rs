@@ -191,7 +191,8 @@ fn scores<L: F32x16, T: Stored, const R: usize, const N: usize>(
     t: usize,
 ) -> usize {
     let parts = head.dim / 16;
-    let (mut keys, mut queries): ([&[[T; 16]]; N], [&[[f32; 16]]; R]) = ([&[]; N], [&[]; R]);
+    let mut keys: [&[[T; 16]]; N] = [&[]; N];
+    let mut queries: [&[[f32; 16]]; R] = [&[]; R];
     for i in 0..N {
         keys[i] = head.k[head.at(&rows[0], t + i)..][..head.dim].as_chunks().0;
     }

@@ -71,7 +71,8 @@ pub struct UnderLoad {
 }
 
 impl UnderLoad {
-    /// Measures `engine`: a session with one thread and one with two, 20 blocks each in turns, beside busy threads.
+    /// Measures `engine`: a session with one thread and one with two, 20 blocks each in turns,
+    /// beside busy threads.
     ///
     /// # Errors
     /// Those of making a session; [`ErrorKind::Argument`] for no blocks.

@@ -69,5 +69,6 @@ fn seeded_sizes_run_quantised() {
 #[test]
 fn sizes_have_names() {
     assert_eq!("paper".parse::<Size>().unwrap(), Size::Paper);
+    assert_eq!("mid".parse::<Size>().unwrap(), Size::Mid);
     assert!("huge".parse::<Size>().unwrap_err().to_string().contains("paper or base"));
 }

@@ -16,7 +16,7 @@ pub struct BenchArgs {
     /// Bundle [default: the shipped one]
     #[arg(long, value_name = "FILE", conflicts_with = "size")]
     pub model: Option<PathBuf>,
-    /// Seeded weights of a size instead of a bundle: paper or base
+    /// Seeded weights of a size instead of a bundle: paper, mid or base
     #[arg(long, value_name = "SIZE")]
     pub size: Option<Size>,
     /// How the weights of --size are stored: f32, f16, i8 or i4
@@ -25,7 +25,8 @@ pub struct BenchArgs {
     /// midpoint4, midpoint2, midpoint1, euler:N or single, or several: midpoint4,single
     #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',', default_values = ["midpoint4", "single"])]
     pub sampler: Vec<Sampler>,
-    /// Networks to load: all, or those that the samplers need and no encoder, so no re-anchoring (lean)
+    /// Networks to load: all, or those that the samplers need and no encoder, so no re-anchoring
+    /// (lean)
     #[arg(long, value_name = "SET", default_value = "all")]
     pub networks: NetworkSet,
     /// Threads, 1 or 2, or both one after the other: 1,2
@@ -37,17 +38,19 @@ pub struct BenchArgs {
     /// Blocks that are timed
     #[arg(long, value_name = "N", default_value = "200", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=1_000_000))]
     pub blocks: usize,
-    /// Measures beside N threads that do nothing but compute, with one thread and with two in turns: these times alone. Or several
-    /// numbers one after the other: 0,1,2
+    /// Measures beside N threads that do nothing but compute, with one thread and with two in
+    /// turns: these times alone. Or several numbers one after the other: 0,1,2
     #[arg(long, value_name = "N", num_args = 1.., value_delimiter = ',', value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(0..=64), conflicts_with_all = ["threads", "sessions"])]
     pub load: Vec<usize>,
-    /// With --load: milliseconds from one block's start to the next's, at least; a conversation's are 133.3
+    /// With --load: milliseconds from one block's start to the next's, at least; a conversation's
+    /// are 133.3
     #[arg(long, value_name = "MS", default_value = "0", requires = "load", value_parser = milliseconds)]
     pub every: f64,
     /// Leaves out the cold start, for which processes of their own load the bundle
     #[arg(long)]
     pub no_cold_start: bool,
-    /// What the cold start is measured by: loads, makes the first frame, says so, goes on for the blocks
+    /// What the cold start is measured by: loads, makes the first frame, says so, goes on for the
+    /// blocks
     #[arg(long, hide = true, requires = "model")]
     pub child: bool,
     /// Prints JSON: the machine, the kernels, a list of measurements
@@ -176,7 +179,8 @@ fn under_load(args: &BenchArgs, engine: &Arc<Engine>, machine: &Machine) -> Resu
     print(&text)
 }
 
-/// The cold start with each sampler and number of threads; the inner error where no process could be started.
+/// The cold start with each sampler and number of threads; the inner error where no process could
+/// be started.
 fn cold_starts(args: &BenchArgs) -> Result<std::io::Result<Vec<ColdStart>>> {
     let file = match args.size {
         Some(size) => cold_start::File::drawn(size, args.scheme)?,

@@ -2,7 +2,10 @@
 
 use super::people::speech;
 use super::window::Window;
-use crate::metrics::{Liveliness, Moments, NodTally, Nods, Space, Split, Summary, Tally, acceleration_moments, ape, frechet, pck, pose_moments};
+use crate::metrics::{
+    Liveliness, Moments, NodTally, Nods, Space, Split, Summary, Tally, acceleration_moments, ape, frechet, pck,
+    pose_moments,
+};
 use serde::Serialize;
 use visavis::{Frame, Result, Rig};
 
@@ -63,11 +66,11 @@ impl Measured {
 pub struct Figures {
     /// Windows.
     pub windows: usize,
-    /// Frechet distance of poses to the corpus', m²: over all windows the mean over batches of 8 windows, over a class of windows that
-    /// of the pooled class (SARAH 4).
+    /// Frechet distance of poses to the corpus', m²: over all windows the mean over batches of 8
+    /// windows, over a class of windows that of the pooled class (SARAH 4).
     pub fgd: Option<f64>,
-    /// Over all windows: the distance of each batch, whose mean is [`Figures::fgd`]. What two bundles' batches differ by tells how sure
-    /// the difference of their means is.
+    /// Over all windows: the distance of each batch, whose mean is [`Figures::fgd`]. What two
+    /// bundles' batches differ by tells how sure the difference of their means is.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub fgd_batches: Vec<f64>,
     /// Frechet distance of accelerations, (m/s²)², likewise.
@@ -109,7 +112,8 @@ pub struct Row {
     pub speaking: Figures,
     /// Over the others.
     pub non_speaking: Figures,
-    /// Wrist speed in frames in which the agent speaks over that in the others, in windows that have both.
+    /// Wrist speed in frames in which the agent speaks over that in the others, in windows that
+    /// have both.
     pub wrist_ratio: Option<f64>,
     /// How lively the agent is while the user speaks alone.
     pub listens: Liveliness,

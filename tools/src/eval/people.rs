@@ -1,4 +1,5 @@
-//! The agent beside real people: at rest with a user who stands and says nothing, listening and speaking.
+//! The agent beside real people: at rest with a user who stands and says nothing, listening and
+//! speaking.
 
 use super::clip::{Clip, Segment};
 use super::motion::generate;
@@ -11,14 +12,17 @@ use std::sync::Arc;
 use visavis::internals::frame::FRAME_SAMPLES;
 use visavis::{Engine, Error, ErrorKind, FPS, Frame, Result, Rig, SessionOptions};
 
-/// Statistics of recorded people, made by `python -m visavis_train.corpus.people` from recordings that are not part of this repository.
+/// Statistics of recorded people, made by `python -m visavis_train.corpus.people` from recordings
+/// that are not part of this repository.
 const PEOPLE: &str = include_str!("people.json");
 /// Silent sessions that are averaged, and the seconds of each: eight minutes.
 const RUNS: usize = 4;
 const SECONDS: usize = 120;
-/// Nobody speaks within this of an idle frame, and pauses up to this belong to the speech around them, frames.
+/// Nobody speaks within this of an idle frame, and pauses up to this belong to the speech around
+/// them, frames.
 const MARGIN: usize = 18;
-/// A user whose head is slower than this stands, m/s; an idle agent's user has stood and will stand for two seconds.
+/// A user whose head is slower than this stands, m/s; an idle agent's user has stood and will stand
+/// for two seconds.
 const STANDS: f32 = 0.25;
 const STOOD: usize = 2 * FPS as usize;
 
@@ -51,7 +55,8 @@ impl Real {
     }
 }
 
-/// Which of `frames` frames are speech: the voice's, with short pauses filled. No voice says nothing.
+/// Which of `frames` frames are speech: the voice's, with short pauses filled. No voice says
+/// nothing.
 pub(super) fn speech(voice: Option<Vec<f32>>, frames: usize) -> Vec<bool> {
     let mut speech = voice.map_or_else(|| vec![false; frames], |voice| speech_frames(&voice, frames));
     let mut last = None;
@@ -67,7 +72,8 @@ pub(super) fn speech(voice: Option<Vec<f32>>, frames: usize) -> Vec<bool> {
 }
 
 impl Idle {
-    /// What the agents of conversation clips do while nobody speaks and the user stands; `None` where no clip is a conversation.
+    /// What the agents of conversation clips do while nobody speaks and the user stands; `None`
+    /// where no clip is a conversation.
     pub(super) fn of_clips(rig: &Rig, clips: &[Clip]) -> Result<Option<Self>> {
         let mut tally = Tally::default();
         for clip in clips {
@@ -109,7 +115,8 @@ impl Idle {
 fn idle(segment: &Segment) -> Vec<bool> {
     let n = segment.frames.len();
     let (agent, user) = (speech(segment.agent(), n), speech(segment.user(), n));
-    let near = |mask: &[bool], i: usize, reach: usize| mask[i.saturating_sub(reach)..(i + reach + 1).min(n)].contains(&true);
+    let near =
+        |mask: &[bool], i: usize, reach: usize| mask[i.saturating_sub(reach)..(i + reach + 1).min(n)].contains(&true);
     // The speed of the head over five frames: a standing head sways.
     let moves: Vec<bool> = (0..n)
         .map(|i| {
@@ -135,10 +142,12 @@ mod tests {
 
     #[test]
     fn short_pauses_belong_to_speech_and_idle_keeps_away_from_it() {
-        let tone = |from: usize, to: usize| (0..400 * FRAME_SAMPLES).map(move |i| {
-            let loud = (from * FRAME_SAMPLES..to * FRAME_SAMPLES).contains(&i);
-            if loud { 0.3 * (0.1 * i as f32).sin() } else { 0.0 }
-        });
+        let tone = |from: usize, to: usize| {
+            (0..400 * FRAME_SAMPLES).map(move |i| {
+                let loud = (from * FRAME_SAMPLES..to * FRAME_SAMPLES).contains(&i);
+                if loud { 0.3 * (0.1 * i as f32).sin() } else { 0.0 }
+            })
+        };
         let mut voice: Vec<f32> = tone(50, 80).collect();
         voice.iter_mut().zip(tone(90, 120)).for_each(|(a, b)| *a += b);
         let found = speech(Some(voice.clone()), 400);

@@ -21,11 +21,12 @@ pub struct Verdict {
     pub met: Option<bool>,
 }
 
-/// How near a gaze score must come to its target, and how many windows of the corpus have such a score before that is asked.
+/// How near a gaze score must come to its target, and how many windows of the corpus have such a
+/// score before that is asked.
 const GAZE_TOLERANCE: f64 = 0.1;
 const GAZE_WINDOWS: usize = 3;
-/// A user is followed when the agent stands within this distance after a wait, metres: nearer than people who do not talk with each
-/// other stand (Hall 1966).
+/// A user is followed when the agent stands within this distance after a wait, metres: nearer than
+/// people who do not talk with each other stand (Hall 1966).
 const FOLLOWED: f64 = 2.5;
 
 /// Every target against the report.

@@ -1,9 +1,11 @@
-//! How lively a body is at rest: stillness, speeds, changes of the hands' rest place, sway, spectra.
+//! How lively a body is at rest: stillness, speeds, changes of the hands' rest place, sway,
+//! spectra.
 //!
-//! Hands and head are measured relative to the hips, smoothed by a 9-frame Hann window, lengths scaled to a head joint at
-//! 1.6 m. Both hands are *still* when slower than 3 cm/s. *Rest change*: the mean place of a hand over 2 s moves by more
-//! than 10 cm from one such window to the next. *Sway*: sum of the standard deviations of the hips over the feet, both axes
-//! of the hips' heading, in 30 s. The corpus and recordings of people are measured alike (`corpus/measures.py`).
+//! Hands and head are measured relative to the hips, smoothed by a 9-frame Hann window, lengths
+//! scaled to a head joint at 1.6 m. Both hands are *still* when slower than 3 cm/s. *Rest change*:
+//! the mean place of a hand over 2 s moves by more than 10 cm from one such window to the next.
+//! *Sway*: sum of the standard deviations of the hips over the feet, both axes of the hips'
+//! heading, in 30 s. The corpus and recordings of people are measured alike (`corpus/measures.py`).
 
 use super::{RATE, joint};
 use glam::{DVec2, DVec3};
@@ -67,7 +69,8 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Adds the frames under `mask`, one value a frame. A rig without head, hands and feet adds nothing.
+    /// Adds the frames under `mask`, one value a frame. A rig without head, hands and feet adds
+    /// nothing.
     pub fn add(&mut self, rig: &Rig, frames: &[Frame], mask: &[bool]) {
         let Some(tracks) = Tracks::of(rig, frames) else { return };
         let still: Vec<bool> = tracks.hands.iter().map(|h| h.speed.iter().all(|&v| v < STILL)).collect();

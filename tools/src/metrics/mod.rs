@@ -1,9 +1,11 @@
-//! What a motion is worth, in numbers: feet, wrists, gaze, seams, beat, distributions and distances.
+//! What a motion is worth, in numbers: feet, wrists, gaze, seams, beat, distributions and
+//! distances.
 //!
-//! Every function is pure and reads frames (or a whole [`Recording`](crate::recording::Recording)). Positions are the
-//! *decoded* joint positions ([`Frame::global`](visavis::Frame::global)), not the fixed-bone-length rig's, so that
-//! nothing is prettified. Units are metres, seconds and radians. A metric that has nothing to measure (too few frames,
-//! a joint the rig lacks, no voice, no user) is `None`, never a made-up zero.
+//! Every function is pure and reads frames (or a whole [`Recording`](crate::recording::Recording)).
+//! Positions are the *decoded* joint positions ([`Frame::global`](visavis::Frame::global)), not the
+//! fixed-bone-length rig's, so that nothing is prettified. Units are metres, seconds and radians. A
+//! metric that has nothing to measure (too few frames, a joint the rig lacks, no voice, no user) is
+//! `None`, never a synthetic zero.
 //!
 //! | metric | function | source |
 //! |---|---|---|
@@ -74,7 +76,8 @@ fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     (n > 0).then(|| sum / n as f64)
 }
 
-/// Arithmetic mean of two values or more, and the square of its standard error: variance (n - 1) over n.
+/// Arithmetic mean of two values or more, and the square of its standard error: variance (n - 1)
+/// over n.
 pub(crate) fn mean_and_error2(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;

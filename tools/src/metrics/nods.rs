@@ -11,7 +11,8 @@ const LEAST: f64 = 0.035;
 const TAKES: std::ops::RangeInclusive<usize> = 4..=18;
 /// Dips that follow each other within this many frames are one nod.
 const ONE: usize = 24;
-/// A user pauses for up to this long after a phrase, frames; nods within it, or this half before, have a lag.
+/// A user pauses for up to this long after a phrase, frames; nods within it, or this half before,
+/// have a lag.
 const PAUSE: usize = 60;
 
 /// Nods by what the user does, while the agent is silent.
@@ -91,7 +92,8 @@ impl NodTally {
     }
 }
 
-/// Frames at which nods begin, of the head's pitch (down positive, radians): it dips and comes back, soon and far enough.
+/// Frames at which nods begin, of the head's pitch (down positive, radians): it dips and comes
+/// back, soon and far enough.
 fn nods(pitch: &[f64]) -> Vec<usize> {
     let slow = gaussian(pitch, 15.0);
     let fast = gaussian(&pitch.iter().zip(slow).map(|(p, s)| p - s).collect::<Vec<_>>(), 1.0);
