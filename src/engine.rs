@@ -256,15 +256,6 @@ impl Engine {
         Nets { reference: self.flow.as_ref(), student }
     }
 
-    /// The encoder of motion, for whoever cannot do without.
-    ///
-    /// # Errors
-    /// [`ErrorKind::State`] when it was not loaded.
-    pub(crate) fn encoder(&self) -> Result<&Encoder> {
-        let missing = || Error::new(ErrorKind::State, "this engine was loaded without the encoder; load all networks");
-        self.encoder.as_ref().ok_or_else(missing)
-    }
-
     /// The model's name, as its bundle tells it.
     pub fn name(&self) -> &str {
         &self.config.name
@@ -316,8 +307,8 @@ impl Engine {
         flows + self.encoder.as_ref().map_or(0, Encoder::bytes) + self.decoder.bytes() + self.audio.bytes()
     }
 
-    /// Bytes of packed weights that a block with `sampler` reads: the flow once an evaluation, the
-    /// decoder once, the audio encoder once a voice. Re-anchoring and slots that catch up come on
+    /// Bytes of packed weights that a block with `sampler` reads: the flow once per evaluation, the
+    /// decoder once, the audio encoder once per voice. Re-anchoring and slots that catch up come on
     /// top.
     pub fn block_bytes(&self, sampler: Sampler) -> usize {
         let nets = self.nets();

@@ -21,6 +21,7 @@ macro_rules! scale {
             }
 
             /// The values, out of the scale's keeping.
+            #[cfg(feature = "internals")]
             pub fn into_inner(self) -> B {
                 self.0
             }

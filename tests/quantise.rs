@@ -1,10 +1,11 @@
-//! Quantised bundles: made alike every time, loaded with checks, and close to what they were made from.
+//! Quantised bundles: made alike every time, loaded with checks, and close to what they were made
+//! from.
 
 mod common;
 
 use common::{Inputs, golden_path, motion_of, tiny, tiny_f32, tiny_in};
 use std::sync::Arc;
-use visavis::internals::bundle::{Contents, int16_activations};
+use visavis::internals::bundle::{TensorInfo, int16_activations};
 use visavis::internals::config::{GazeConfig, GazeCurve};
 use visavis::internals::kernels::{Kernels, Scheme};
 use visavis::internals::quant::{Budget, Keep, Options, Scene, Teacher, quantise};
@@ -13,6 +14,11 @@ use visavis::{BundleFile, Engine, ErrorKind, Frame, Sampler, SessionOptions};
 
 fn options(scheme: Scheme, keep: &[Keep]) -> Options<'_> {
     Options { scheme, smallest: 0, keep, calibration: None, budget: None }
+}
+
+/// What a bundle holds, as its tensors say themselves.
+fn infos(file: &BundleFile<'_>) -> Vec<TensorInfo> {
+    file.parse().unwrap().1.infos()
 }
 
 /// The tiny bundle with a calibration of gaze, whose free levels change every second or so.
@@ -60,8 +66,9 @@ fn blocks_stay_close_in_the_order_of_the_schemes() {
     }
 }
 
-/// What is measured is what a session does: the reference's free run has the bits of a plain session that is driven as any caller drives
-/// it, with free gaze, whose levels are drawn from the calibration, and with a target.
+/// What is measured is what a session does: the reference's free run has the bits of a plain
+/// session that is driven as any caller drives it, with free gaze, whose levels are drawn from the
+/// calibration, and with a target.
 #[test]
 fn the_teacher_runs_as_a_plain_session_does() {
     let engine = with_gaze();
@@ -99,7 +106,8 @@ fn another_calibration_is_refused() {
     assert!(e.kind() == ErrorKind::Argument && e.to_string().contains("calibration"), "{e}");
 }
 
-/// Rounding for the inputs that layers get: better blocks of the same size, and the same bytes every time.
+/// Rounding for the inputs that layers get: better blocks of the same size, and the same bytes
+/// every time.
 #[test]
 fn calibrated_rounding_loses_less() {
     let reference = Engine::from_file(&tiny_f32(), Kernels::detect().unwrap()).unwrap();
@@ -142,11 +150,12 @@ fn sessions_have_the_same_bits_on_every_level_and_with_two_threads() {
     }
 }
 
-/// The networks' transformer layers, where the time goes, take int8; every name that the rule speaks of is that of a layer.
+/// The networks' transformer layers, where the time goes, take int8; every name that the rule
+/// speaks of is that of a layer.
 #[test]
 fn int16_activations_are_those_of_named_layers() {
-    let contents = Contents::of(&tiny_f32()).unwrap();
-    let names: Vec<_> = contents.tensors.iter().filter_map(|t| t.name.strip_suffix(".weight")).collect();
+    let tensors = infos(&tiny_f32());
+    let names: Vec<_> = tensors.iter().filter_map(|t| t.name.strip_suffix(".weight")).collect();
     let (wide, narrow): (Vec<&str>, Vec<&str>) = names.iter().partition(|name| int16_activations(name));
     for name in ["flow.final.out", "student.final.mod", "flow.tau.0", "flow.layers.0.mod", "vae.decoder.latent"] {
         assert!(wide.contains(&name), "{name} of {wide:?}");
@@ -219,7 +228,8 @@ fn damaged_schemes_are_typed_errors() {
     assert!(e.kind() == invalid && e.to_string().contains("shape"), "{e}");
 }
 
-/// A flipped bit of a value makes another value; of a scale perhaps one that is refused, and nothing worse.
+/// A flipped bit of a value makes another value; of a scale perhaps one that is refused, and
+/// nothing worse.
 #[test]
 fn flipped_bits_are_errors_or_harmless() {
     for scheme in [Scheme::I8, Scheme::I4] {
@@ -240,16 +250,16 @@ fn flipped_bits_are_errors_or_harmless() {
     }
 }
 
-/// Half the bytes of f32, by every tensor but the statistics, and the idle clip as the latents that the encoder makes of it.
+/// Half the bytes of f32, by every tensor but the statistics, and the idle clip as the latents that
+/// the encoder makes of it.
 #[test]
 fn a_bundle_of_halves_is_half_a_bundle() {
     let file = tiny_f32();
     let keep = ["flow.layers.0.fc1=f32".parse().unwrap()];
-    let contents = |file: &BundleFile<'_>| Contents::of(file).unwrap().tensors;
-    let before = contents(&file);
-    let bytes = |tensors: &[visavis::internals::bundle::TensorInfo]| tensors.iter().map(|t| t.bytes).sum::<usize>();
+    let before = infos(&file);
+    let bytes = |tensors: &[TensorInfo]| tensors.iter().map(|t| t.bytes).sum::<usize>();
     let halves = quantise(&file, &Options { smallest: 8192, ..options(Scheme::F16, &[]) }).unwrap().bytes;
-    let halves = contents(&BundleFile::from_bytes(halves, "halves"));
+    let halves = infos(&BundleFile::from_bytes(halves, "halves"));
     assert!(2 * bytes(&halves) <= bytes(&before), "{} of {}", bytes(&halves), bytes(&before));
     for t in &halves {
         let vector = t.shape.len() < 2 || !t.name.ends_with(".weight");
@@ -259,7 +269,7 @@ fn a_bundle_of_halves_is_half_a_bundle() {
     }
 
     let quantised = quantise(&file, &options(Scheme::F16, &keep)).unwrap().bytes;
-    let kept = contents(&BundleFile::from_bytes(quantised.clone(), "kept"));
+    let kept = infos(&BundleFile::from_bytes(quantised.clone(), "kept"));
     let dtype = |name: &str| kept.iter().find(|t| t.name == name).map(|t| t.dtype.as_str());
     assert_eq!([dtype("flow.layers.0.fc1.bias"), dtype("flow.layers.1.fc1.bias")], [Some("f32"), Some("f16")]);
     assert_eq!([dtype("idle.frames"), dtype("idle.latents")], [None, Some("f32")]);
@@ -269,7 +279,7 @@ fn a_bundle_of_halves_is_half_a_bundle() {
 }
 
 #[test]
-fn kept_layers_stay_floats_and_inspect_tells() {
+fn kept_layers_stay_floats() {
     let keep: Vec<Keep> = ["flow.layers.*", "*.qkv=f32"].iter().map(|k| k.parse().unwrap()).collect();
     let quantised = quantise(&tiny_f32(), &options(Scheme::I8, &keep)).unwrap();
     let scheme = |name: &str| quantised.schemes[name];
@@ -278,10 +288,9 @@ fn kept_layers_stay_floats_and_inspect_tells() {
     assert_eq!(scheme("student.layers.0.fc1"), Scheme::I8);
     let file = BundleFile::from_bytes(quantised.bytes.clone(), "kept");
     Engine::from_file(&file, Kernels::detect().unwrap()).unwrap();
-    let contents = Contents::of(&file).unwrap();
-    let dtype = |name: &str| contents.tensors.iter().find(|t| t.name == name).unwrap().dtype.clone();
+    let tensors = infos(&file);
+    let dtype = |name: &str| tensors.iter().find(|t| t.name == name).unwrap().dtype.clone();
     assert_eq!([dtype("flow.layers.0.fc1.weight"), dtype("student.layers.0.fc1.weight")], ["f16", "i8"]);
-    assert!(contents.to_string().contains("quantised to i8"), "{contents}");
     let e = quantise(&tiny_f32(), &options(Scheme::I8, &["nobody.*".parse().unwrap()])).unwrap_err();
     assert!(e.kind() == ErrorKind::Argument && e.to_string().contains("nobody.*"), "{e}");
 }

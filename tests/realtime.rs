@@ -14,7 +14,8 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 use visavis::internals::kernels::Scheme;
 use visavis::internals::session::Anchoring;
-use visavis::{Budget, Governor, Hold, Sampler, Session, SessionOptions, Speaker};
+use visavis::replay::Hold;
+use visavis::{Budget, Governor, Sampler, Session, SessionOptions, Speaker};
 
 /// The system's allocator, counting what is asked of it while `WATCH` is set.
 struct Counting;

@@ -4,22 +4,21 @@
 use std::ptr::{null, null_mut};
 use visavis_c::*;
 
-/// A session, and sound for it, that threads share.
-#[derive(Clone, Copy)]
-struct Shared {
-    session: *mut VisavisSession,
-    buffer: *const f32,
-}
+/// A pointer that threads may share.
+struct Shared<T>(*mut T);
 
-// SAFETY: sessions may be pushed into from any thread; the buffer is only read.
-unsafe impl Send for Shared {}
-
-impl Shared {
-    /// Both; by a method, so that closures capture the whole.
-    fn both(self) -> (*mut VisavisSession, *const f32) {
-        (self.session, self.buffer)
+impl<T> Clone for Shared<T> {
+    fn clone(&self) -> Self {
+        *self
     }
 }
+
+impl<T> Copy for Shared<T> {}
+
+// SAFETY: sessions may be pushed into from any thread; the buffer is only read.
+unsafe impl<T> Send for Shared<T> {}
+// SAFETY: as above.
+unsafe impl<T> Sync for Shared<T> {}
 
 #[test]
 fn two_push_from_one_buffer_while_a_third_polls() {
@@ -31,12 +30,12 @@ fn two_push_from_one_buffer_while_a_third_polls() {
         assert_eq!(visavis_engine_from_memory(bundle.as_ptr(), bundle.len(), &mut engine), VisavisStatus::Ok);
         assert_eq!(visavis_session_new(engine, null(), &mut session), VisavisStatus::Ok);
     }
-    let sound = [0.1f32; 960];
-    let shared = Shared { session, buffer: sound.as_ptr() };
+    let mut sound = [0.1f32; 960];
+    let (session, buffer) = (Shared(session), Shared(sound.as_mut_ptr()));
     std::thread::scope(|scope| {
         for thread in 0..2i32 {
             scope.spawn(move || {
-                let (session, buffer) = shared.both();
+                let (Shared(session), Shared(buffer)) = (session, buffer);
                 for i in 0..300 {
                     // SAFETY: alive until after the scope; the buffer has that length and nobody
                     // writes to it.
@@ -79,14 +78,14 @@ fn two_push_from_one_buffer_while_a_third_polls() {
             // SAFETY: alive; room for four frames of that size.
             let status = unsafe {
                 let size = size_of::<VisavisFrame>();
-                visavis_session_poll(session, 1e6, frames.as_mut_ptr(), size, null_mut(), 0, &mut count)
+                visavis_session_poll(session.0, 1e6, frames.as_mut_ptr(), size, null_mut(), 0, &mut count)
             };
             assert_eq!((status, count, frames[0].index), (VisavisStatus::Ok, 4, 4 * k));
         }
     });
     // SAFETY: made above, not freed, nobody else is inside.
     unsafe {
-        visavis_session_free(session);
+        visavis_session_free(session.0);
         visavis_engine_free(engine);
     }
 }

@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use visavis::internals::bundle::Contents;
+use visavis_tools::contents::Contents;
 use visavis::{BundleFile, Engine, Sampler, SessionOptions};
 use visavis_fuzz::seed_small;
 

@@ -19,7 +19,9 @@ mod weights;
 pub use encoder::AudioEncoder;
 pub use input::{Speaker, VoiceInput};
 pub use line::VoiceStats;
-pub use resample::{MAX_RATE, MIN_RATE, Resampler, check_rate, resample_to_24k};
+#[cfg(feature = "internals")]
+pub use resample::resample_to_24k;
+pub use resample::{MAX_RATE, MIN_RATE, Resampler, check_rate};
 #[cfg(feature = "tract")]
 pub use tract::TractEncoder;
 pub use voice::{VOICE_SECONDS, Voice};

@@ -27,7 +27,8 @@ pub(super) fn noise(seed: u32, count: usize) -> Vec<f32> {
 
 #[test]
 fn output_n_is_the_input_at_n_over_24000() {
-    // The ideal answer is the same sine sampled at 24 kHz; the ends are left out (silence outside is a step).
+    // The ideal answer is the same sine sampled at 24 kHz; the ends are left out (silence outside
+    // is a step).
     for rate in RATES {
         let out = resample_to_24k(&sine(997.0, rate, rate as usize), rate).unwrap();
         assert_eq!(out.len(), 24_000);
@@ -137,7 +138,8 @@ fn a_change_of_rate_leaves_no_gap() {
     }
     let lag = voice.lag_samples();
     assert_eq!(lag, Resampler::new(16_000).unwrap().latency_samples());
-    // Each half second is 250 whole periods, so the sine goes on across the seams; lags add up to the largest.
+    // Each half second is 250 whole periods, so the sine goes on across the seams; lags add up to
+    // the largest.
     let first = Resampler::new(48_000).unwrap().latency_samples();
     for (from, to, lag) in [(0, 24_000, first), (24_000, 48_000, lag)] {
         let want = sine(500.0, 24_000, to - from);

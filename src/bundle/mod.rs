@@ -1,11 +1,12 @@
-//! Bundles: one safetensors file that holds a model's weights and, in its metadata, its configuration.
+//! Bundles: one safetensors file that holds a model's weights and, in its metadata, its
+//! configuration.
 //!
-//! Opening a bundle checks everything before any of it is used: the container, the config's ranges, each tensor's name,
-//! dtype and shape, and that every number is finite. Sizes are bounded by the file's own before memory is taken.
+//! Opening a bundle checks everything before any of it is used: the container, the config's ranges,
+//! each tensor's name, dtype and shape, and that every number is finite. Sizes are bounded by the
+//! file's own before memory is taken.
 
 mod audio;
 mod check;
-mod contents;
 mod drawn;
 mod file;
 mod parse;
@@ -15,11 +16,10 @@ mod stored;
 mod tensors;
 
 pub use audio::AudioSource;
-pub use contents::{Contents, TensorInfo};
 pub use file::{BundleFile, LoadMode};
 pub(crate) use rewrite::{Entry, assemble, entries, failed, floats};
 pub use stored::{SMALL, StoredData, StoredWeights, int16_activations};
-pub use tensors::Tensors;
+pub use tensors::{TensorInfo, Tensors};
 
 use crate::error::{Error, ErrorKind};
 

@@ -8,11 +8,38 @@ use crate::error::Result;
 use crate::kernels::Scheme;
 use safetensors::SafeTensors;
 use safetensors::tensor::TensorView;
+use serde::Serialize;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashSet};
 
-/// The tensors of a parsed bundle. Each read checks name, dtype, shape and finiteness, and is remembered, so that
-/// [`Tensors::finish`] can name what nobody asked for.
+/// One tensor of a bundle.
+#[derive(Debug, Clone, Serialize)]
+pub struct TensorInfo {
+    /// Name.
+    pub name: String,
+    /// Storage type: `f32` or `f16`, for quantised weights their scheme (`i8`, `i4`).
+    pub dtype: String,
+    /// Shape, row-major; two int4 weights count as one element.
+    pub shape: Vec<usize>,
+    /// Bytes in the file.
+    pub bytes: usize,
+}
+
+impl TensorInfo {
+    /// Number of parameters; the padding of int4 rows of odd length counts, scales of quantised
+    /// weights do not.
+    pub fn elements(&self) -> usize {
+        let n = self.shape.iter().product();
+        match self.dtype.as_str() {
+            "i4" => 2 * n,
+            _ if self.name.ends_with(".scale") => 0,
+            _ => n,
+        }
+    }
+}
+
+/// The tensors of a parsed bundle. Each read checks name, dtype, shape and finiteness, and is
+/// remembered, so that [`Tensors::finish`] can name what nobody asked for.
 #[derive(Debug)]
 pub struct Tensors<'a> {
     container: Option<SafeTensors<'a>>,
@@ -43,8 +70,8 @@ impl<'a> Tensors<'a> {
         Self { container, file, drawn: None, kept: None, quantisation, read: RefCell::default() }
     }
 
-    /// No bundle: every tensor that is asked for is there, drawn from its name, weights of some size in `scheme`. To measure
-    /// networks of sizes for which there is no bundle.
+    /// No bundle: every tensor that is asked for is there, drawn from its name, weights of some
+    /// size in `scheme`. To measure networks of sizes for which there is no bundle.
     #[cfg(feature = "internals")]
     pub fn seeded(scheme: Scheme) -> Self {
         let drawn = Some(scheme);
@@ -69,10 +96,11 @@ impl<'a> Tensors<'a> {
         assemble(&serde_json::to_value(&config).map_err(failed)?, &kept.entries)
     }
 
-    /// Names, dtypes, shapes and sizes, sorted by name; the dtype of quantised weights is their scheme.
-    pub fn infos(&self) -> Vec<super::TensorInfo> {
+    /// Names, dtypes, shapes and sizes, sorted by name; the dtype of quantised weights is their
+    /// scheme.
+    pub fn infos(&self) -> Vec<TensorInfo> {
         let mut infos: Vec<_> = (self.container.iter().flat_map(SafeTensors::iter))
-            .map(|(name, view)| super::TensorInfo {
+            .map(|(name, view)| TensorInfo {
                 name: name.to_owned(),
                 dtype: match self.recorded(name) {
                     Some(scheme) => scheme.to_string(),
@@ -86,7 +114,8 @@ impl<'a> Tensors<'a> {
         infos
     }
 
-    /// Whether the bundle holds a tensor of this name; one that is drawn, whatever bundles of its scheme may hold.
+    /// Whether the bundle holds a tensor of this name; one that is drawn, whatever bundles of its
+    /// scheme may hold.
     pub fn has(&self, name: &str) -> bool {
         match (&self.container, self.drawn) {
             (Some(container), _) => container.tensor(name).is_ok(),
@@ -94,7 +123,8 @@ impl<'a> Tensors<'a> {
         }
     }
 
-    /// Leaves the tensors whose names begin with `prefix` alone: [`Tensors::finish`] does not miss them.
+    /// Leaves the tensors whose names begin with `prefix` alone: [`Tensors::finish`] does not miss
+    /// them.
     pub fn skip(&self, prefix: &str) {
         let recorded = self.quantisation.iter().flat_map(|q| q.tensors.keys().map(String::as_str));
         let names = self.container.iter().flat_map(SafeTensors::names).chain(recorded);
@@ -104,7 +134,8 @@ impl<'a> Tensors<'a> {
     /// Fails if the bundle holds, or its config records, tensors that nothing has read.
     ///
     /// # Errors
-    /// [`ErrorKind::BundleInvalid`](crate::error::ErrorKind::BundleInvalid) naming the first of them.
+    /// [`ErrorKind::BundleInvalid`](crate::error::ErrorKind::BundleInvalid) naming the first of
+    /// them.
     pub fn finish(&self) -> Result<()> {
         let read = self.read.borrow();
         let recorded = self.quantisation.iter().flat_map(|q| q.tensors.keys().map(String::as_str));

@@ -1,14 +1,23 @@
 //! Motion through encoder and decoder.
 
 use super::Engine;
-use crate::error::Result;
+use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{BLOCK_FRAMES, Frame};
 use crate::kernels::KvDtype;
 use crate::normaliser::{Metric, Standardised};
 use crate::pose;
-use crate::vae::RoundTrip;
+use crate::vae::{Encoder, RoundTrip};
 
 impl Engine {
+    /// The encoder of motion, for whoever cannot do without.
+    ///
+    /// # Errors
+    /// [`ErrorKind::State`] when it was not loaded.
+    pub(crate) fn encoder(&self) -> Result<&Encoder> {
+        let missing = || Error::new(ErrorKind::State, "this engine was loaded without the encoder; load all networks");
+        self.encoder.as_ref().ok_or_else(missing)
+    }
+
     /// The whole blocks of `frames` through encoder and decoder, as decoded: borders are not
     /// bridged and feet not held.
     ///

@@ -91,11 +91,6 @@ impl Condition {
         self.present[3] && self.guided
     }
 
-    /// The user's positions as given, when present.
-    pub fn user(&self) -> Option<&[f32]> {
-        self.present[0].then(|| &self.values[self.layout.user()])
-    }
-
     pub(super) fn copy_from(&mut self, other: &Self) {
         debug_assert_eq!(self.layout, other.layout);
         self.values.copy_from_slice(&other.values);

@@ -31,8 +31,9 @@ struct Layer {
     moments: Vec<f64>,
 }
 
+#[cfg(feature = "internals")]
 impl Activations {
-    /// Keeps at most `limit` rows a layer, from every `every`-th call (1: from each).
+    /// Keeps at most `limit` rows per layer, from every `every`-th call (1: from each).
     pub fn new(limit: usize, every: usize) -> Self {
         Self { limit, every: every.max(1), moments: false, layers: BTreeMap::new() }
     }
@@ -62,7 +63,9 @@ impl Activations {
     pub fn rows(&self, name: &str) -> &[f32] {
         self.layers.get(name).map_or(&[], |layer| &layer.rows)
     }
+}
 
+impl Activations {
     pub(super) fn listen(&mut self, name: &str, x: &[f32], cols: usize) {
         if name.is_empty() {
             return;

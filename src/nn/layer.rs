@@ -59,13 +59,8 @@ impl Rows {
     }
 
     /// Number of rows.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.base.len()
-    }
-
-    /// Whether there are no rows.
-    pub fn is_empty(&self) -> bool {
-        self.base.is_empty()
     }
 
     /// Writes the rows' keys and values of layer `layer` to `cache`, then attends over each row's

@@ -11,28 +11,22 @@ use crate::frame::{BLOCK_FRAMES, Frame, JOINT_CHANNELS, ROOT_CHANNELS, Root, Tra
 use crate::kernels::Kernels;
 use crate::normaliser::Metric;
 use crate::par::Pool;
-use glam::{Mat3, Quat, Vec3};
+use glam::{Mat3, Quat};
 
-/// Joints that one thread makes transforms of at a time: as many as go through the polar factors side by side, twice.
+/// Joints that one thread makes transforms of at a time: as many as go through the polar factors
+/// side by side, twice.
 const LOT: usize = 32;
 
-/// The root of a body whose hips are at `hips` (world): floor projection of the hips, heading of their +Z axis.
+/// Streaming decoder of feature vectors: integrates the root, places the joints in the world and
+/// fits the rig.
 ///
-/// Hips whose +Z axis is upright (within 0.6 degrees) have no heading; they get `yaw`, best that of the frame before.
-pub fn root_of(hips: &Transform, yaw: f64) -> Root {
-    let z = hips.rotation * Vec3::Z;
-    let upright = libm::hypotf(z.x, z.z) < 0.01;
-    let yaw = if upright { yaw } else { libm::atan2(f64::from(z.x), f64::from(z.z)) };
-    Root { x: f64::from(hips.position.x), z: f64::from(hips.position.z), yaw }
-}
-
-/// Streaming decoder of feature vectors: integrates the root, places the joints in the world and fits the rig.
+/// A feature vector `x` holds `F = 3 + 36 J` values: `(vx, vz)` the root's displacement since the
+/// frame before in that frame's heading frame (m/frame), `dyaw` the turn (rad/frame), then for each
+/// joint the 12 vertices of its icosahedron ([`super::icosahedron`]) in *this* frame's heading
+/// frame (origin: the root on the floor; +Z: the heading).
 ///
-/// A feature vector `x` holds `F = 3 + 36 J` values: `(vx, vz)` the root's displacement since the frame
-/// before in that frame's heading frame (m/frame), `dyaw` the turn (rad/frame), then for each joint the 12 vertices of its
-/// icosahedron ([`super::icosahedron`]) in *this* frame's heading frame (origin: the root on the floor; +Z: the heading).
-///
-/// Decoding allocates nothing, provided that the frame's buffers have room for J joints ([`Frame::empty`]).
+/// Decoding allocates nothing, provided that the frame's buffers have room for J joints
+/// ([`Frame::empty`]).
 #[derive(Debug, Clone)]
 pub struct Decoder {
     radius: f32,
@@ -44,7 +38,8 @@ pub struct Decoder {
     /// Whether poses are judged; else the guard only holds.
     guarded: bool,
     kernels: Kernels,
-    /// Joints of a block's frames, each frame's in its heading frame, `[4, J]`, and a rest up to whole lots.
+    /// Joints of a block's frames, each frame's in its heading frame, `[4, J]`, and a rest up to
+    /// whole lots.
     joints: Vec<Transform>,
     /// The root's step to each of them, and the root.
     steps: [[f32; ROOT_CHANNELS]; BLOCK_FRAMES],
@@ -56,7 +51,8 @@ pub struct Decoder {
 }
 
 impl Decoder {
-    /// A decoder for `rig` and icosahedra of circumradius `radius` (metres), with the root at the origin facing +Z.
+    /// A decoder for `rig` and icosahedra of circumradius `radius` (metres), with the root at the
+    /// origin facing +Z.
     pub fn new(kernels: Kernels, rig: &Rig, radius: f32) -> Self {
         let n = rig.len();
         Self {
@@ -76,7 +72,8 @@ impl Decoder {
         }
     }
 
-    /// The same with borders between blocks bridged (`bridge.rs`): a difference dies away with the time constant `frames`.
+    /// The same with borders between blocks bridged (`bridge.rs`): a difference dies away with the
+    /// time constant `frames`.
     #[must_use]
     pub fn with_bridge(mut self, rig: &Rig, frames: f32) -> Self {
         self.bridge = Some(Bridge::new(rig, frames));
@@ -90,7 +87,8 @@ impl Decoder {
         self
     }
 
-    /// The same with frames that no body could show replaced (`guard.rs`); decoding then never fails.
+    /// The same with frames that no body could show replaced (`guard.rs`); decoding then never
+    /// fails.
     #[must_use]
     pub fn with_guard(mut self) -> Self {
         self.guarded = true;
@@ -122,8 +120,8 @@ impl Decoder {
         self.previous.fill(Quat::IDENTITY);
     }
 
-    /// Takes the pose of `x`, one feature vector, for the one before the first frame: it is held where the first one is not
-    /// plausible.
+    /// Takes the pose of `x`, one feature vector, for the one before the first frame: it is held
+    /// where the first one is not plausible.
     ///
     /// # Panics
     /// If `x` is not F long.
@@ -134,33 +132,36 @@ impl Decoder {
         self.guard.prime(&self.joints[..self.previous.len()]);
     }
 
-    /// Decodes the next frame: advances the root and fills `root`, `global`, `hips`, `local`, `fit_error` and `held` of
-    /// `frame`; its other fields are left alone.
+    /// Decodes the next frame: advances the root and fills `root`, `global`, `hips`, `local`,
+    /// `fit_error` and `held` of `frame`; its other fields are left alone.
     ///
     /// # Errors
     /// As [`Decoder::decode_block`].
     ///
     /// # Panics
     /// If `x` is not F long.
+    #[cfg(feature = "internals")]
     pub fn decode(&mut self, x: Metric<&[f32]>, frame: &mut Frame) -> Result<()> {
         self.decode_block(x, std::slice::from_mut(frame))
     }
 
-    /// Decodes the next block of up to four frames, `x` `[frames, F]`, as [`Decoder::decode`] does one. Between the features and the
-    /// frames, in this order: what is not plausible is replaced, the border to the block before is bridged, then planted feet are
-    /// held.
+    /// Decodes the next block of up to four frames, `x` `[frames, F]`, as [`Decoder::decode`] does
+    /// one. Between the features and the frames, in this order: what is not plausible is replaced,
+    /// the border to the block before is bridged, then planted feet are held.
     ///
     /// # Errors
-    /// [`ErrorKind::State`] if a value of `x` is not finite and there is no guard; the decoder is then as before and `frames`
-    /// untouched.
+    /// [`ErrorKind::State`] if a value of `x` is not finite and there is no guard; the decoder is
+    /// then as before and `frames` untouched.
     ///
     /// # Panics
     /// If there are more than four frames, or `x` does not have as many vectors of length F.
+    #[cfg(feature = "internals")]
     pub fn decode_block(&mut self, x: Metric<&[f32]>, frames: &mut [Frame]) -> Result<()> {
         self.decode_block_on(None, x, frames)
     }
 
-    /// The same on the threads of `pool`, as far as frames do not depend on each other; with the same bits.
+    /// The same on the threads of `pool`, as far as frames do not depend on each other; with the
+    /// same bits.
     ///
     /// # Errors
     /// As [`Decoder::decode_block`].
@@ -193,7 +194,8 @@ impl Decoder {
         Ok(())
     }
 
-    /// Up to four frames for which there are no usable features: the guard treats them as it does features that are not finite.
+    /// Up to four frames for which there are no usable features: the guard treats them as it does
+    /// features that are not finite.
     ///
     /// # Panics
     /// If there are more than four frames, or no guard.
@@ -206,8 +208,8 @@ impl Decoder {
         self.show(pool, frames);
     }
 
-    /// Up to four frames without features: motion eases into a held, breathing pose. Decoding goes on from there in a
-    /// cross-fade, as if there had been no time between.
+    /// Up to four frames without features: motion eases into a held, breathing pose. Decoding goes
+    /// on from there in a cross-fade, as if there had been no time between.
     ///
     /// # Panics
     /// If there are more than four frames.
@@ -297,7 +299,8 @@ impl Decoder {
     }
 }
 
-/// Calls `work` for each of `items` with one of the `tools`, on the threads of `pool` if there is one.
+/// Calls `work` for each of `items` with one of the `tools`, on the threads of `pool` if there is
+/// one.
 fn each<S: Send, T: Send>(
     pool: Option<&mut Pool>,
     tools: &mut [S; 2],
@@ -310,7 +313,8 @@ fn each<S: Send, T: Send>(
     }
 }
 
-/// Writes `joints`, in the heading frame of `root`, to `frame` as world transforms, but for the signs of the rotations.
+/// Writes `joints`, in the heading frame of `root`, to `frame` as world transforms, but for the
+/// signs of the rotations.
 fn place(joints: &[Transform], root: &Root, frame: &mut Frame) {
     let heading = root.rotation();
     frame.root = *root;
@@ -321,57 +325,9 @@ fn place(joints: &[Transform], root: &Root, frame: &mut Frame) {
     }
 }
 
-/// The way back: world transforms of consecutive frames to feature vectors.
-///
-/// With the roots that a [`Decoder`] gave, it returns what the decoder was given, vertices made rigid.
-#[derive(Debug, Clone)]
-pub struct Encoder {
-    radius: f32,
-    previous: Option<Root>,
-}
-
-impl Encoder {
-    /// An encoder with icosahedra of circumradius `radius`, metres. Its first frame has root channels 0.
-    pub fn new(radius: f32) -> Self {
-        Self { radius, previous: None }
-    }
-
-    /// Starts again; `previous` is the root of the frame before the next, if there is one.
-    pub fn reset(&mut self, previous: Option<Root>) {
-        self.previous = previous;
-    }
-
-    /// Writes the feature vector of the next frame, whose root is `root` ([`root_of`], or [`Frame::root`]) and whose joints
-    /// stand at `global` (world, J of them), to `x`.
-    ///
-    /// # Panics
-    /// If `x` is not `3 + 36 J` long.
-    pub fn encode(&mut self, root: Root, global: &[Transform], mut x: Metric<&mut [f32]>) {
-        let x = x.values_mut();
-        assert_eq!(x.len(), feature_count(global.len()), "a feature vector has 3 + 36 J values");
-        let (head, joints) = x.split_at_mut(ROOT_CHANNELS);
-        head.copy_from_slice(&step(self.previous.unwrap_or(root), root));
-        let heading = root.rotation().inverse();
-        for (joint, vertices) in global.iter().zip(joints.as_chunks_mut::<JOINT_CHANNELS>().0) {
-            let local = Transform { position: root.to_local(joint.position), rotation: heading * joint.rotation };
-            encode(&local, self.radius, vertices);
-        }
-        self.previous = Some(root);
-    }
-}
-
-/// `(vx, vz, dyaw)` from one root to the next: the inverse of [`Root::advanced`].
-fn step(from: Root, to: Root) -> [f32; 3] {
-    let (s, c) = libm::sincos(from.yaw);
-    let (x, z) = (to.x - from.x, to.z - from.z);
-    let turn = std::f64::consts::TAU;
-    let dyaw = to.yaw - from.yaw;
-    [c * x - s * z, s * x + c * z, dyaw - turn * (dyaw / turn).round()].map(|v| v as f32)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic;
+    use super::super::{Encoder, synthetic};
     use super::*;
 
     const RADIUS: f32 = 0.1;
@@ -454,19 +410,6 @@ mod tests {
     }
 
     #[test]
-    fn root_channels_are_in_the_previous_heading_frame() {
-        let [from, to] = [Root { x: 5.0, z: 1.0, yaw: 3.1 }, Root { x: 5.2, z: 0.9, yaw: -3.1 }];
-        let [vx, vz, dyaw] = step(from, to);
-        assert!((dyaw - (std::f32::consts::TAU - 6.2)).abs() < 1e-6, "the short way round, not {dyaw}");
-        let again = from.advanced(vx, vz, dyaw);
-        assert!((again.x - to.x).abs() < 1e-7 && (again.z - to.z).abs() < 1e-7 && (again.yaw - to.yaw).abs() < 1e-6);
-        // One step ahead while facing +X goes along +X.
-        let east = Root { x: 0.0, z: 0.0, yaw: std::f64::consts::FRAC_PI_2 };
-        let ahead = east.advanced(0.0, 1.0, 0.0);
-        assert!((ahead.x - 1.0).abs() < 1e-12 && ahead.z.abs() < 1e-12);
-    }
-
-    #[test]
     fn ten_minutes_do_not_drift() {
         let recording = synthetic::walk(18_000);
         let mut decoder = Decoder::new(Kernels::detect().unwrap(), &recording.rig, RADIUS);
@@ -478,16 +421,6 @@ mod tests {
         let last = recording.frames.last().unwrap().root;
         let off = (out.root.x - last.x).hypot(out.root.z - last.z);
         assert!(off < 1e-4, "{off} m");
-    }
-
-    #[test]
-    fn heading_of_lying_hips_is_the_one_before() {
-        let lying = Transform { position: Vec3::Y, rotation: Quat::from_rotation_x(-std::f32::consts::FRAC_PI_2) };
-        assert_eq!(root_of(&lying, 0.7).yaw, 0.7);
-        let leaning =
-            Transform { position: Vec3::X, rotation: Quat::from_rotation_y(1.0) * Quat::from_rotation_x(-1.2) };
-        assert!((root_of(&leaning, 0.7).yaw - 1.0).abs() < 1e-6);
-        assert_eq!(root_of(&leaning, 0.7).x, 1.0);
     }
 
     #[test]

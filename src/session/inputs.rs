@@ -17,7 +17,7 @@ use crate::user::{HeadInput, HeadTrack, Presence, UserSample};
 use glam::Vec3;
 
 /// A voice and the encoder that listens to it.
-pub(super) struct Ear {
+pub(super) struct EncodedVoice {
     voice: Voice,
     encoder: Hearing,
     samples: Box<[f32; BLOCK_SAMPLES]>,
@@ -69,15 +69,15 @@ impl Hearing {
 
 /// All inputs of a session.
 pub(super) struct Inputs {
-    agent: Ear,
-    user: Ear,
+    agent: EncodedVoice,
+    user: EncodedVoice,
     head: HeadInput,
     track: HeadTrack,
     user_delay: u64,
     pub(super) condition: Condition,
 }
 
-impl Ear {
+impl EncodedVoice {
     fn new(engine: &Engine, options: &SessionOptions, delay: u32) -> Result<Self> {
         Ok(Self {
             voice: Voice::new(),
@@ -131,31 +131,31 @@ impl Ear {
 }
 
 /// A voice and the block that it listens for.
-pub(super) type Listening<'a> = Option<(u64, &'a mut Ear)>;
+pub(super) type Listening<'a> = Option<(u64, &'a mut EncodedVoice)>;
 
-/// Lets all of `ears`, of any sessions, listen: side by side where more than one has something to
+/// Lets all of `inputs`, of any sessions, listen: side by side where more than one has something to
 /// hear.
-pub(super) fn listen(exec: &mut Exec, engine: &Engine, ears: &mut [Listening<'_>]) {
-    let hears = |(block, ear): &&(u64, &mut Ear)| ear.voice.is_present() && ear.known(*block).is_some();
-    let several = ears.iter().flatten().filter(hears).count() > 1;
-    let listen = |exec: &mut Exec, ear: &mut Listening<'_>| {
-        if let Some((block, ear)) = ear {
-            ear.heard = ear.listen(exec, engine, *block);
+pub(super) fn listen(exec: &mut Exec, engine: &Engine, inputs: &mut [Listening<'_>]) {
+    let hears = |(block, input): &&(u64, &mut EncodedVoice)| input.voice.is_present() && input.known(*block).is_some();
+    let several = inputs.iter().flatten().filter(hears).count() > 1;
+    let listen = |exec: &mut Exec, input: &mut Listening<'_>| {
+        if let Some((block, input)) = input {
+            input.heard = input.listen(exec, engine, *block);
         }
     };
     if several {
-        exec.each(ears, listen);
+        exec.each(inputs, listen);
     } else {
         // One voice by itself has both threads in each of its layers.
-        ears.iter_mut().for_each(|ear| listen(exec, ear));
+        inputs.iter_mut().for_each(|input| listen(exec, input));
     }
 }
 
 impl Inputs {
     pub(super) fn new(engine: &Engine, options: &SessionOptions) -> Result<Self> {
         Ok(Self {
-            agent: Ear::new(engine, options, engine.config.agent_delay_blocks)?,
-            user: Ear::new(engine, options, engine.config.user_delay_blocks)?,
+            agent: EncodedVoice::new(engine, options, engine.config.agent_delay_blocks)?,
+            user: EncodedVoice::new(engine, options, engine.config.user_delay_blocks)?,
             head: HeadInput::new(),
             track: HeadTrack::new(),
             user_delay: u64::from(engine.config.user_delay_blocks),
@@ -205,7 +205,7 @@ impl Inputs {
     }
 
     /// The voices, to [`listen`] for `block`.
-    pub(super) fn ears(&mut self, block: u64) -> [Listening<'_>; 2] {
+    pub(super) fn voice_inputs(&mut self, block: u64) -> [Listening<'_>; 2] {
         [Some((block, &mut self.agent)), Some((block, &mut self.user))]
     }
 

@@ -126,8 +126,8 @@ pub struct Session {
 impl Session {
     pub(crate) fn new(engine: Arc<Engine>, options: SessionOptions) -> Result<Self> {
         options.check(&engine)?;
-        let exec = engine.exec(options.threads)?;
-        options.core_mask.map_or(Ok(()), |mask| exec.pool().pin_helper(mask))?;
+        let mut exec = engine.exec(options.threads)?;
+        options.core_mask.map_or(Ok(()), |mask| exec.pool_mut().pin_helper(mask))?;
         Self::on(exec, engine, options)
     }
 

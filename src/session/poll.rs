@@ -99,8 +99,9 @@ impl Session {
         Ok(())
     }
 
-    /// Forgets times and decisions.
+    /// Takes notice of what was set before; forgets times and decisions.
     pub(super) fn forget(&mut self) {
+        self.take_notice();
         self.now = 0.0;
         self.times.clear();
         self.log.clear();

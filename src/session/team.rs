@@ -16,17 +16,16 @@ use std::time::Instant;
 ///
 /// Reading the weights is most of a block's time. Sessions whose blocks are due at the same time,
 /// and made by the same sampler with history at the same flow times, go through the flow network
-/// and the decoder side by side, in the flow network up to 16 rows a pass: four without a gaze
+/// and the decoder side by side, in the flow network up to 16 rows per pass: four without a gaze
 /// target, two with one, eight on the single-step student. The others are computed one after the
 /// other. What each session shows has the bits that [`Session::poll`] gives.
 ///
 /// A team has threads of its own: make the sessions with one thread.
 ///
 /// ```no_run
-/// # fn main() -> visavis::error::Result<()> {
-/// use visavis::engine::Engine;
-/// use visavis::session::SessionOptions;
+/// use visavis::{Engine, SessionOptions};
 ///
+/// # fn main() -> visavis::Result<()> {
 /// let engine = Engine::load("models/visavis-base-i8.safetensors")?;
 /// let mut team = engine.team(2)?;
 /// let mut a = engine.session(SessionOptions { seed: 1, ..SessionOptions::default() })?;

@@ -10,5 +10,6 @@ pub use track::{HeadTrack, Presence, TrackStats, UserSample};
 pub const HOLD_SECONDS: f64 = 0.5;
 /// Positions further than this from the session's origin are not believed, metres.
 pub const MAX_DISTANCE: f32 = 1_000.0;
-/// A head that moves faster than this between two samples was put there (a tracker that lost it, a teleport), m/s.
+/// A head that moves faster than this between two samples was put there (a tracker that lost it, a
+/// teleport), m/s.
 pub const TELEPORT_SPEED: f32 = 12.0;

@@ -9,11 +9,13 @@
 
 mod decoder;
 mod encoder;
+#[cfg(feature = "internals")]
 mod round_trip;
 mod stack;
 mod work;
 
 pub use decoder::{Decoder, DecoderState, Decoding};
 pub use encoder::{Encoder, EncoderState};
+#[cfg(feature = "internals")]
 pub use round_trip::RoundTrip;
 pub use work::Work;

@@ -155,6 +155,7 @@ impl StackState {
     }
 
     /// Takes back the last block, if there is one: the next one is written over it.
+    #[cfg(feature = "internals")]
     pub(super) fn back(&mut self) {
         self.block = self.block.saturating_sub(1).max(self.first);
     }

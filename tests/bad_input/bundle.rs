@@ -4,7 +4,7 @@ use super::common::golden_path;
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 use std::collections::{BTreeMap, HashMap};
-use visavis::internals::bundle::{CONFIG_KEY, Contents};
+use visavis::internals::bundle::CONFIG_KEY;
 use visavis::{BundleFile, Engine, Error, ErrorKind, SessionOptions};
 
 pub(super) const NAME: &str = "some/bundle.safetensors";
@@ -201,16 +201,8 @@ fn weights_that_are_not_finite_are_corrupt() {
     }
 }
 
-#[test]
-fn inspecting_refuses_the_same_containers() {
-    let bytes = tiny_bytes();
-    let contents = |bytes: Vec<u8>| Contents::of(&BundleFile::from_bytes(bytes, NAME));
-    assert!(contents(bytes.clone()).unwrap().to_string().contains("tiny"));
-    let e = contents(bytes[..bytes.len() / 2].to_vec()).unwrap_err();
-    assert!(e.kind() == ErrorKind::BundleCorrupt && e.to_string().starts_with(NAME), "{e}");
-}
-
-/// A bundle as an asset inside another file, at an offset that is neither of a page nor of a number.
+/// A bundle as an asset inside another file, at an offset that is neither of a page nor of a
+/// number.
 #[test]
 fn a_bundle_inside_another_file() {
     let (bytes, offset) = (tiny_bytes(), 4_097);

@@ -1,4 +1,5 @@
-//! Who may use whom: the rooms of the library from the ground up, and no circles among the files of a room.
+//! Who may use whom: the rooms of the library from the ground up, and no circles among the files of
+//! a room.
 
 mod modules;
 
@@ -6,8 +7,8 @@ use modules::{Modules, circle};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// A room, what it is for, and the rooms that it uses. Each stands above those that it uses, so there is no circle.
-/// Tests in `src/` keep to it as well.
+/// A room, what it is for, and the rooms that it uses. Each stands above those that it uses, so
+/// there is no circle. Tests in `src/` keep to it as well.
 const ROOMS: &[(&str, &str, &[&str])] = &[
     ("error", "the one error type", &[]),
     ("bounded", "reading files, never more than was agreed", &[]),
@@ -44,7 +45,7 @@ const ROOMS: &[(&str, &str, &[&str])] = &[
 ];
 
 /// Modules of `src/lib.rs` itself: the front door, which lets names out. No room goes through it.
-const FRONT: &[&str] = &["internals", "openxr", "stats", "threads"];
+const FRONT: &[&str] = &["internals", "openxr", "replay", "stats", "threads"];
 
 /// Circles among the files of a room that are still to be broken up.
 const CIRCLES: &[(&str, &[&str])] = &[("kernels", &["exec", "linear"])];

@@ -1,8 +1,10 @@
-//! What the `visavis` command does, as a library: recordings in and out, measures, judgements, quantised bundles' reports.
+//! What the `visavis` command does, as a library: recordings in and out, measures, judgements,
+//! quantised bundles' reports.
 //!
 //! | module | what |
 //! |---|---|
 //! | [`offline`] | a session over whole files |
+//! | [`contents`] | what a bundle holds, for people |
 //! | [`recording`] | finished motion with what was heard and seen |
 //! | [`export`] | a recording to BVH, glTF, VRMA and the HTML viewer |
 //! | [`metrics`] | measures of motion |
@@ -15,6 +17,7 @@
 //! The runtime itself is the crate [`visavis`].
 
 pub mod bench;
+pub mod contents;
 pub mod eval;
 pub mod export;
 pub mod metrics;

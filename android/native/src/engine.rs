@@ -71,7 +71,7 @@ fn engine_close<'l>(_: &mut Env<'l>, _: JClass<'l>, engine: jlong) -> Outcome<jb
 }
 
 fn engine_name<'l>(env: &mut Env<'l>, _: JClass<'l>, engine: jlong) -> Outcome<JString<'l>> {
-    Ok(JString::from_str(env, &ENGINES.get(engine)?.name())?)
+    Ok(JString::from_str(env, ENGINES.get(engine)?.name())?)
 }
 
 fn engine_has_student<'l>(_: &mut Env<'l>, _: JClass<'l>, engine: jlong) -> Outcome<jboolean> {

@@ -10,6 +10,8 @@ mod tests;
 /// Which activation.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Activation {
+    /// In a network it is part of the epilogue; benchmarks and tests run it alone.
+    #[cfg_attr(not(feature = "internals"), expect(dead_code))]
     Gelu,
     Silu,
 }

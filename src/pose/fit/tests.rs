@@ -9,8 +9,13 @@ fn fit_for(rig: &Rig) -> Fit {
 
 fn fitted(fit: &mut Fit, joints: &[Transform]) -> Frame {
     let mut frame = Frame::empty(joints.len());
-    fit.fit(joints, &Root::default(), &mut frame);
+    fit_at(fit, joints, &Root::default(), &mut frame);
     frame
+}
+
+fn fit_at(fit: &mut Fit, joints: &[Transform], root: &Root, frame: &mut Frame) {
+    fit.turn(&mut vec![Transform::IDENTITY; joints.len()], joints, root, frame);
+    fit.sign(frame);
 }
 
 fn placed(recording: &Walk, frame: &Frame) -> Vec<Transform> {
@@ -19,7 +24,8 @@ fn placed(recording: &Walk, frame: &Frame) -> Vec<Transform> {
     out
 }
 
-/// Positions off by `share` of the bone to the parent (standard deviation), rotations by `share` radians.
+/// Positions off by `share` of the bone to the parent (standard deviation), rotations by `share`
+/// radians.
 fn noisy(recording: &Walk, frame: &Frame, share: f32, noise: &mut Noise) -> Vec<Transform> {
     let jitter = |(j, t): (usize, &Transform)| {
         let scale = share * if j == 0 { 0.2 } else { recording.rig.offset(j).length() };
@@ -128,7 +134,7 @@ fn far_from_the_origin_the_heading_frame_keeps_precision() {
     let frame = &recording.frames[1];
     let root = Root { x: 4_000.0, z: -7_000.0, yaw: 1.0 };
     let mut got = Frame::empty(recording.rig.len());
-    fit_for(&recording.rig).fit(&frame.global, &root, &mut got);
+    fit_at(&mut fit_for(&recording.rig), &frame.global, &root, &mut got);
     assert!(got.fit_error < 1e-5);
     let turned = root.rotation() * frame.local[0];
     assert!(got.local[0].dot(turned).abs() > 1.0 - 1e-5);
@@ -137,7 +143,8 @@ fn far_from_the_origin_the_heading_frame_keeps_precision() {
 
 #[test]
 fn a_nearly_straight_leg_does_not_pop() {
-    // Decoded 1 cm too short, the knee passing through the straight line: no jump, and no knee that juts out.
+    // Decoded 1 cm too short, the knee passing through the straight line: no jump, and no knee that
+    // juts out.
     let mut before: Option<Vec3> = None;
     for i in -50..=50 {
         let middle = Vec3::new(0.0, -0.405, i as f32 * 2e-4);

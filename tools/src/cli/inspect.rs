@@ -2,8 +2,8 @@
 
 use super::args::InspectArgs;
 use super::print;
-use visavis::internals::bundle::Contents;
 use visavis::{BundleFile, Error, ErrorKind, Result};
+use visavis_tools::contents::Contents;
 
 pub fn run(args: &InspectArgs) -> Result<()> {
     let contents = Contents::of(&BundleFile::open(&args.file)?)?;

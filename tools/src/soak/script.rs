@@ -131,7 +131,8 @@ impl<'a> Script<'a> {
         }
     }
 
-    /// The user's head, 120 times a second: around the agent, nearer and further, standing, gone, elsewhere at once.
+    /// The user's head, 120 times per second: around the agent, nearer and further, standing, gone,
+    /// elsewhere at once.
     fn walk(&mut self, session: &mut Session, at: f64, part: u64) -> Result<()> {
         let now = session.next_due();
         if part == 3 || part == 12 {

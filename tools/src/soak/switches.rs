@@ -3,15 +3,17 @@
 use super::{Voices, script::Script};
 use crate::metrics::switch_seam;
 use std::sync::Arc;
-use visavis::{Decision, Engine, Governor, Hold, Plan, Result, Sampler, SessionOptions};
+use visavis::replay::{Decision, Hold, Plan};
+use visavis::{Engine, Governor, Result, Sampler, SessionOptions};
 
 /// Blocks between two switches.
 const STAY: u64 = 6;
 /// Switches of a soak.
 pub(super) const SWITCHES: u64 = 120;
 
-/// Seam metric at `switches` switches of a session that goes up and down a governor's ladder, a step every 0.8 s, in a conversation;
-/// `None` where nothing moves. Slots are up to date when they are climbed to, as the governor sees to it: it changes time, not motion.
+/// Seam metric at `switches` switches of a session that goes up and down a governor's ladder, a
+/// step every 0.8 s, in a conversation; `None` where nothing moves. Slots are up to date when they
+/// are climbed to, as the governor sees to it: it changes time, not motion.
 ///
 /// # Errors
 /// Those of a session.

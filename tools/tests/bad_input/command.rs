@@ -3,7 +3,8 @@
 use super::cli::{Scratch, fails, names, tone};
 use super::common::golden_path;
 use std::path::Path;
-use visavis::ErrorKind;
+use visavis::{BundleFile, ErrorKind};
+use visavis_tools::contents::Contents;
 use visavis_tools::offline::{FILES, OutputFolder};
 
 fn text(path: &Path) -> String {
@@ -167,4 +168,13 @@ fn an_unknown_cpu_level_is_an_error() {
     let message = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.code() == Some(1) && message.contains("VISAVIS_CPU=abacus"), "{message}");
     assert!(!scratch.path("out").exists());
+}
+
+#[test]
+fn inspecting_refuses_the_same_containers() {
+    let bytes = std::fs::read(super::common::golden_path("tiny.safetensors")).expect("the tiny bundle");
+    let contents = |bytes: Vec<u8>| Contents::of(&BundleFile::from_bytes(bytes, "some/bundle"));
+    assert!(contents(bytes.clone()).unwrap().to_string().contains("tiny"));
+    let e = contents(bytes[..bytes.len() / 2].to_vec()).unwrap_err();
+    assert!(e.kind() == ErrorKind::BundleCorrupt && e.to_string().starts_with("some/bundle"), "{e}");
 }

@@ -1,36 +1,11 @@
 //! What a bundle holds, for people (`visavis inspect`).
 
-use super::BundleFile;
-use crate::config::Config;
-use crate::error::Result;
-use crate::kernels::Scheme;
 use serde::Serialize;
 use std::fmt;
-
-/// One tensor of a bundle.
-#[derive(Debug, Clone, Serialize)]
-pub struct TensorInfo {
-    /// Name.
-    pub name: String,
-    /// Storage type: `f32` or `f16`, for quantised weights their scheme (`i8`, `i4`).
-    pub dtype: String,
-    /// Shape, row-major; two int4 weights count as one element.
-    pub shape: Vec<usize>,
-    /// Bytes in the file.
-    pub bytes: usize,
-}
-
-impl TensorInfo {
-    /// Number of parameters; the padding of int4 rows of odd length counts, scales of quantised weights do not.
-    pub fn elements(&self) -> usize {
-        let n = self.shape.iter().product();
-        match self.dtype.as_str() {
-            "i4" => 2 * n,
-            _ if self.name.ends_with(".scale") => 0,
-            _ => n,
-        }
-    }
-}
+use visavis::internals::bundle::TensorInfo;
+use visavis::internals::config::Config;
+use visavis::internals::kernels::Scheme;
+use visavis::{BundleFile, Result};
 
 /// A bundle's config and tensor list; `Display` prints the summary that `visavis inspect` shows.
 #[derive(Debug, Clone, Serialize)]
