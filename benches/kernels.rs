@@ -1,7 +1,8 @@
 //! Kernels on the shapes of the real networks, for every CPU level available here.
 //!
-//! `cargo bench --bench kernels` (add `-- linear` and so on to choose). `pass` walks the matrices of a whole network, more than the
-//! caches hold, so its bytes a second are read from memory; `linear` repeats one matrix, which a large cache may hold.
+//! `cargo bench --bench kernels` (add `-- linear` and so on to choose). `pass` walks the matrices
+//! of a whole network, more than the caches hold, so its bytes per second are read from memory;
+//! `linear` repeats one matrix, which a large cache may hold.
 
 use std::hint::black_box;
 use std::time::Duration;

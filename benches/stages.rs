@@ -1,8 +1,9 @@
 //! Stages of a block of the real networks, from a session's own probe, with seeded weights.
 //!
-//! `cargo bench --bench stages` (add `-- paper/i8` and so on to choose). Each figure is the time of one stage in whole blocks that are
-//! computed one after the other, so caches are in the state that a session leaves them in; `block` is all of them. Re-anchoring
-//! is off: it is spread over blocks, and `visavis bench` shows what it adds.
+//! `cargo bench --bench stages` (add `-- paper/i8` and so on to choose). Each figure is the time of
+//! one stage in whole blocks that are computed one after the other, so caches are in the state that
+//! a session leaves them in; `block` is all of them. Re-anchoring is off: it is spread over blocks,
+//! and `visavis bench` shows what it adds.
 
 use std::time::Duration;
 
@@ -33,7 +34,7 @@ fn blocks(session: &mut Session, samples: &[f32], blocks: u64, stage: Option<usi
 fn stages(c: &mut Criterion) {
     let kernels = Kernels::detect().expect("kernels");
     let samples: Vec<f32> = (0..BLOCK_SAMPLES).map(|i| 0.2 * (0.04 * i as f32).sin()).collect();
-    for (size, name) in [(Size::Base, "base"), (Size::Paper, "paper")] {
+    for (size, name) in [(Size::Base, "base"), (Size::Mid, "mid"), (Size::Paper, "paper")] {
         for scheme in [Scheme::F16, Scheme::I8, Scheme::I4] {
             let engine = size.engine(scheme, kernels).expect("an engine");
             for sampler in [Sampler::Midpoint4, Sampler::Single] {

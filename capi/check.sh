@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Checks of the C interface: header up to date, layouts, and a C program under the address sanitizer. Usage: capi/check.sh
+# Checks of the C interface: header up to date, layouts, programs and libraries of two versions, and a C program under the address
+# sanitizer. Usage: capi/check.sh
 #
 # Needs a C compiler; as root, gcc is installed from Debian if there is none.
 set -euo pipefail
@@ -13,11 +14,14 @@ fi
 echo '-- tests: header, layouts, C#'
 cargo test --quiet -p visavis-header
 cargo test --quiet --release -p visavis-capi
-echo '-- library'
-cargo build --quiet --release -p visavis-capi
 target=$(cargo metadata --no-deps --format-version 1 | sed 's/.*"target_directory":"\([^"]*\)".*/\1/')
 out=$target/capi
-mkdir -p "$out"
+mkdir -p "$out/next"
+echo '-- library, and one of the next version, whose structs have grown'
+cargo build --quiet --release -p visavis-capi --features grown
+cp "$target/release/libvisavis_c.so" "$out/next/"
+cargo run --quiet -p visavis-header -- "$out/next/visavis.h"
+cargo build --quiet --release -p visavis-capi
 
 echo '-- header alone: C and, where there is a compiler, C++'
 cc -x c -Wall -Wextra -Werror -pedantic -fsyntax-only -include capi/include/visavis.h - </dev/null
@@ -32,6 +36,18 @@ libraries=(-lpthread -ldl -lm)
 echo '-- smoke program, shared library'
 cc "${warnings[@]}" -I capi/include capi/examples/smoke.c -o "$out/smoke" -L "$target/release" -lvisavis_c "${libraries[@]}"
 LD_LIBRARY_PATH=$target/release "$out/smoke" tests/goldens/tiny.safetensors
+echo '-- programs and libraries of two versions'
+versions() { # versions NAME HEADER FLAGS...
+  local name=$1 header=$2
+  shift 2
+  cc "${warnings[@]}" "$@" -I "$header" capi/tests/versions.c -o "$out/$name" -L "$target/release" -lvisavis_c "${libraries[@]}"
+}
+versions program capi/include
+versions next-program "$out/next" -DNEWER
+LD_LIBRARY_PATH=$target/release "$out/program" tests/goldens/tiny.safetensors same
+LD_LIBRARY_PATH=$out/next "$out/program" tests/goldens/tiny.safetensors newer
+LD_LIBRARY_PATH=$target/release "$out/next-program" tests/goldens/tiny.safetensors older
+LD_LIBRARY_PATH=$out/next "$out/next-program" tests/goldens/tiny.safetensors same
 echo '-- smoke program, static library, address sanitizer with leak check'
 if echo 'int main(void) { return 0; }' | cc -fsanitize=address,undefined -x c - -o "$out/probe" 2>/dev/null && "$out/probe"; then
   cc "${warnings[@]}" -g -fsanitize=address,undefined -fno-omit-frame-pointer -I capi/include capi/examples/smoke.c -o "$out/smoke-asan" \

@@ -4,12 +4,13 @@
 //! cargo run --release --example stream [-- BUNDLE]
 //! ```
 //!
-//! Three things happen at their own rates, as they do on a headset: a sound card delivers 10 ms of the user's voice at
-//! 48 kHz, a tracker tells the user's head 90 times a second, and the renderer wants a pose 30 times a second. The clock is
-//! simulated, so the example runs as fast as it can; a real application passes its own clock to the same calls.
+//! Three things happen at their own rates, as they do on a headset: a sound card delivers 10 ms of
+//! the user's voice at 48 kHz, a tracker tells the user's head 90 times per second, and the
+//! renderer wants a pose 30 times per second. The clock is simulated, so the example runs as fast
+//! as it can; a real application passes its own clock to the same calls.
 //!
-//! The user walks half a circle around the agent while the agent speaks and then listens. Once a second the program prints
-//! where the agent stands, where it looks, and how it keeps up.
+//! The user walks half a circle around the agent while the agent speaks and then listens. Once a
+//! second the program prints where the agent stands, where it looks, and how it keeps up.
 
 use glam::Vec3;
 use std::collections::VecDeque;
@@ -21,24 +22,28 @@ const AUDIO_RATE: u32 = 48_000;
 
 fn main() -> Result<()> {
     let bundle = std::env::args().nth(1).unwrap_or_else(|| "models/visavis-base-i8.safetensors".to_owned());
-    // Once an application: weights are packed for this CPU. Any number of sessions share the engine.
+    // Once an application: weights are packed for this CPU. Any number of sessions share the
+    // engine.
     let engine = Engine::load(&bundle)?;
     // Once a user: all memory that the session will need is taken here.
     let mut session = engine.session(SessionOptions { seed: 1, ..SessionOptions::default() })?;
     let head = engine.rig().index("head").unwrap_or(0);
     println!("{}: {} joints, kernels {}", engine.name(), engine.rig().len(), engine.cpu_level());
 
-    // What the agent says is known ahead (text-to-speech), so it is pushed as a whole utterance, at the voice's own rate.
+    // What the agent says is known ahead (text-to-speech), so it is pushed as a whole utterance, at
+    // the voice's own rate.
     session.push_agent_audio(&babble(0.0, 5.0, 130.0, 22_050), 22_050)?;
 
     let mut shown: Option<Frame> = None;
     let mut ready: VecDeque<Frame> = VecDeque::new();
-    // A common multiple of the three rates: 90 ticks of the tracker, 30 of the renderer, 100 of the sound card a second.
+    // A common multiple of the three rates: 90 ticks of the tracker, 30 of the renderer, 100 of the
+    // sound card a second.
     const TICKS: u32 = 900;
     for tick in 0..SECONDS * TICKS {
         let now = f64::from(tick) / f64::from(TICKS);
         if tick % (TICKS / 100) == 0 {
-            // The sound card hands over what was said in the last 10 ms. The user speaks from second 6 to 10.
+            // The sound card hands over what was said in the last 10 ms. The user speaks from
+            // second 6 to 10.
             session.push_user_audio(&babble(now - 0.01, now, 210.0, AUDIO_RATE), AUDIO_RATE)?;
         }
         if tick % (TICKS / 90) == 0 {
@@ -84,14 +89,15 @@ fn print_second(frame: &Frame, head: usize) {
     );
 }
 
-/// The user's head at `t` seconds: half a circle of 1.5 m around the agent in 10 s, from in front of it.
+/// The user's head at `t` seconds: half a circle of 1.5 m around the agent in 10 s, from in front
+/// of it.
 fn walk(t: f32) -> Vec3 {
     let angle = PI * (t / 10.0).min(1.0);
     Vec3::new(1.5 * angle.sin(), 1.65, 1.5 * angle.cos())
 }
 
-/// Stands in for a voice: a buzz in syllables, from `from` to `to` seconds. The deep one speaks at once, the high one from
-/// second 6 to 10.
+/// Stands in for a voice: a buzz in syllables, from `from` to `to` seconds. The deep one speaks at
+/// once, the high one from second 6 to 10.
 fn babble(from: f64, to: f64, pitch: f32, rate: u32) -> Vec<f32> {
     let first = (from * f64::from(rate)).round() as i64;
     let last = (to * f64::from(rate)).round() as i64;

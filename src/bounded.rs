@@ -4,7 +4,8 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// The bytes of the file at `path`, which may be at most `most` long: pipes and devices that never end are cut there.
+/// The bytes of the file at `path`, which may be at most `most` long: pipes and devices that never
+/// end are cut there.
 pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let file = File::open(path)?;
     let expected = file.metadata()?.len();

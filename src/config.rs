@@ -1,6 +1,8 @@
-//! The bundle's configuration: everything about sizes, rates and the rig that weights alone do not say.
+//! The bundle's configuration: everything about sizes, rates and the rig that weights alone do not
+//! say.
 //!
-//! Stored as JSON under the key `visavis` of the safetensors metadata; written by `training/visavis_train/export.py`.
+//! Stored as JSON under the key `visavis` of the safetensors metadata; written by
+//! `training/visavis_train/export.py`.
 
 use crate::rig::Rig;
 use crate::scheme::Scheme;
@@ -21,7 +23,8 @@ pub struct Config {
     pub description: String,
     /// Licence statement of the weights, with the acknowledgements that their data asks for.
     pub licence: String,
-    /// Blocks by which the user's voice and position lag the block they steer (1: up to the end of the block before).
+    /// Blocks by which the user's voice and position lag the block they steer (1: up to the end of
+    /// the block before).
     pub user_delay_blocks: u32,
     /// Blocks by which the agent's own voice lags (0: known ahead, as from text-to-speech).
     pub agent_delay_blocks: u32,
@@ -39,7 +42,8 @@ pub struct Config {
     pub student: Option<StudentConfig>,
     /// Defaults for sessions.
     pub session: SessionConfig,
-    /// What the gaze channel does to this model's gaze, as `visavis calibrate` measured it; none: not measured.
+    /// What the gaze channel does to this model's gaze, as `visavis calibrate` measured it; none:
+    /// not measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gaze: Option<GazeConfig>,
     /// How the weights were quantised; none for a bundle as it was exported.
@@ -63,7 +67,7 @@ pub struct PoseConfig {
     pub radius: f32,
 }
 
-/// Audio encoder: a stack of causal convolutions over 24 kHz mono, one feature vector a frame.
+/// Audio encoder: a stack of causal convolutions over 24 kHz mono, one feature vector per frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AudioConfig {
     /// Convolutions, first to last; the product of their strides is 800.
@@ -149,13 +153,16 @@ pub struct SessionConfig {
     pub guidance: f32,
     /// Gaze guidance weight.
     pub gaze_guidance: f32,
-    /// Scale of the noise that blocks start from; 1 samples what was trained, less gives calmer motion.
+    /// Scale of the noise that blocks start from; 1 samples what was trained, less gives calmer
+    /// motion.
     #[serde(default = "unscaled")]
     pub temperature: f32,
-    /// Late evaluations see history nearly clean; absent: history is imputed at each evaluation's own flow time.
+    /// Late evaluations see history nearly clean; absent: history is imputed at each evaluation's
+    /// own flow time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub clean_history: Option<CleanHistory>,
-    /// Time constant with which the difference at a border between blocks dies away, frames; 0 leaves borders as decoded.
+    /// Time constant with which the difference at a border between blocks dies away, frames; 0
+    /// leaves borders as decoded.
     #[serde(default = "bridge")]
     pub bridge: f32,
     /// Blocks between re-anchorings; 0 never.
@@ -174,8 +181,8 @@ pub struct GazeConfig {
     /// The single-step student, when the bundle holds one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub student: Option<GazeCurve>,
-    /// Mean gaze scores of stretches of recorded conversations at evenly spaced quantiles from the least to the largest: what free
-    /// gaze is drawn from.
+    /// Mean gaze scores of stretches of recorded conversations at evenly spaced quantiles from the
+    /// least to the largest: what free gaze is drawn from.
     pub levels: Vec<f32>,
     /// Length of such a stretch, seconds.
     pub seconds: f32,
@@ -189,7 +196,8 @@ impl GazeConfig {
     }
 }
 
-/// Pairs of a mean gaze score and the channel's value that brings it about, both ascending; linear between, constant beyond.
+/// Pairs of a mean gaze score and the channel's value that brings it about, both ascending; linear
+/// between, constant beyond.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct GazeCurve(pub Vec<[f32; 2]>);
@@ -207,9 +215,11 @@ impl GazeCurve {
     }
 }
 
-/// Flow time at which history enters an evaluation at flow time `t`: `t` itself below `from`, `max(t, tau)` from there.
+/// Flow time at which history enters an evaluation at flow time `t`: `t` itself below `from`,
+/// `max(t, tau)` from there.
 ///
-/// Early evaluations decide what happens and listen to the conditions; late ones, over a clean past, join it smoothly.
+/// Early evaluations decide what happens and listen to the conditions; late ones, over a clean
+/// past, join it smoothly.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CleanHistory {
     /// Least flow time of history in late evaluations, 0 to 1.

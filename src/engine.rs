@@ -19,17 +19,20 @@ use std::sync::Arc;
 /// Most frames of an idle clip: every session starts by going through them.
 const MAX_IDLE_FRAMES: usize = 3600;
 
-/// Which networks of a bundle an engine holds: what no session will use need not take memory, nor time to load.
+/// Which networks of a bundle an engine holds: what no session will use need not take memory, nor
+/// time to load.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Networks {
-    /// The network of the samplers with steps: midpoint and Euler. Without it sessions need [`Sampler::Single`].
+    /// The network of the samplers with steps: midpoint and Euler. Without it sessions need
+    /// [`Sampler::Single`].
     pub reference: bool,
     /// The student of the single-step sampler, where the bundle has one.
     pub student: bool,
     /// The encoder of motion. Without it sessions do not re-anchor, whatever their options say.
     pub encoder: bool,
-    /// The weights that make the modulation of any flow time, a fifth of a flow network. Without them sessions have the bundle's own flow times:
-    /// the midpoint rules, [`Sampler::Euler`] with 1, 2, 4 or 8 steps, and [`Sampler::Single`].
+    /// The weights that make the modulation of any flow time, a fifth of a flow network. Without
+    /// them sessions have the bundle's own flow times: the midpoint rules, [`Sampler::Euler`] with
+    /// 1, 2, 4 or 8 steps, and [`Sampler::Single`].
     pub modulation: bool,
 }
 
@@ -40,8 +43,8 @@ impl Default for Networks {
     }
 }
 
-/// A loaded model: networks packed for this CPU, rig and statistics. Immutable and shared; all that changes is in
-/// [`Session`](crate::Session).
+/// A loaded model: networks packed for this CPU, rig and statistics. Immutable and shared; all that
+/// changes is in [`Session`](crate::Session).
 ///
 /// ```no_run
 /// # fn main() -> visavis::Result<()> {
@@ -74,16 +77,18 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// Maps and loads the bundle at `path` with the best kernels of this CPU (or those of `VISAVIS_CPU`).
+    /// Maps and loads the bundle at `path` with the best kernels of this CPU (or those of
+    /// `VISAVIS_CPU`).
     ///
     /// # Errors
-    /// [`ErrorKind::Io`], [`ErrorKind::BundleCorrupt`], [`ErrorKind::BundleVersion`], [`ErrorKind::BundleInvalid`],
-    /// each naming the file; [`ErrorKind::CpuLevel`].
+    /// [`ErrorKind::Io`], [`ErrorKind::BundleCorrupt`], [`ErrorKind::BundleVersion`],
+    /// [`ErrorKind::BundleInvalid`], each naming the file; [`ErrorKind::CpuLevel`].
     pub fn load(path: impl AsRef<Path>) -> Result<Arc<Self>> {
         Self::load_with(path, LoadMode::Map)
     }
 
-    /// As [`Engine::load`], mapping the file or copying it first: [`LoadMode`] tells what each of them survives.
+    /// As [`Engine::load`], mapping the file or copying it first: [`LoadMode`] tells what each of
+    /// them survives.
     ///
     /// # Errors
     /// As [`Engine::load`].
@@ -107,6 +112,19 @@ impl Engine {
         Self::from_file(&BundleFile::from_slice(bytes, name), Kernels::detect()?)
     }
 
+    /// Loads the bundle that lies in an open file, `length` bytes from `offset` on (`None`: up to
+    /// the end), such as an asset that is stored uncompressed in an APK. The descriptor stays the
+    /// caller's; its position is neither used nor moved.
+    ///
+    /// # Errors
+    /// As [`Engine::load`]; [`ErrorKind::Argument`] when the file is shorter.
+    #[cfg(unix)]
+    pub fn from_fd(fd: std::os::fd::BorrowedFd<'_>, offset: u64, length: Option<u64>) -> Result<Arc<Self>> {
+        const NAME: &str = "bundle in an open file";
+        let own = fd.try_clone_to_owned().map_err(|e| Error::io("duplicate the descriptor", NAME, e))?;
+        Self::from_bundle(&BundleFile::open_part(&own.into(), offset, length, NAME)?, Networks::default())
+    }
+
     /// Loads some networks of an opened bundle. The others' tensors are not read, so not checked.
     ///
     /// ```no_run
@@ -122,7 +140,8 @@ impl Engine {
     /// ```
     ///
     /// # Errors
-    /// As [`Engine::load`]; [`ErrorKind::Argument`] when neither the reference network nor a student is left.
+    /// As [`Engine::load`]; [`ErrorKind::Argument`] when neither the reference network nor a
+    /// student is left.
     pub fn from_bundle(file: &BundleFile<'_>, networks: Networks) -> Result<Arc<Self>> {
         Self::from_file_with(file, Kernels::detect()?, networks)
     }
@@ -257,7 +276,8 @@ impl Engine {
         self.student.is_some()
     }
 
-    /// The CPU level that the weights are packed for, as `VISAVIS_CPU` names it: `avx512`, `dotprod`, ...
+    /// The CPU level that the weights are packed for, as `VISAVIS_CPU` names it: `avx512`,
+    /// `dotprod`, ...
     pub fn cpu_level(&self) -> &'static str {
         self.kernels.level().name()
     }
@@ -287,8 +307,9 @@ impl Engine {
         flows + self.encoder.as_ref().map_or(0, Encoder::bytes) + self.decoder.bytes() + self.audio.bytes()
     }
 
-    /// Bytes of packed weights that a block with `sampler` reads: the flow once an evaluation, the decoder once, the audio
-    /// encoder once a voice. Re-anchoring and slots that catch up come on top.
+    /// Bytes of packed weights that a block with `sampler` reads: the flow once per evaluation, the
+    /// decoder once, the audio encoder once per voice. Re-anchoring and slots that catch up come on
+    /// top.
     pub fn block_bytes(&self, sampler: Sampler) -> usize {
         let nets = self.nets();
         let (pass, condition) = nets.of(sampler).map_or((0, 0), |net| (net.pass_bytes(), net.condition_bytes()));
@@ -320,7 +341,8 @@ impl Engine {
     }
 }
 
-/// The idle clip, as bundles hold it: exported ones its frames, quantised ones the latents that the encoder made of them.
+/// The idle clip, as bundles hold it: exported ones its frames, quantised ones the latents that the
+/// encoder made of them.
 enum Idle {
     /// Pose features in metres, `[4 blocks, features]`.
     Frames(Metric),

@@ -1,7 +1,7 @@
 //! The one error type of the public interface.
 //!
-//! Every [`Error`] says what was being done, to which file or argument, what is wrong and what to do about it.
-//! Match on [`Error::kind`]; show the `Display` text to people.
+//! Every [`Error`] says what was being done, to which file or argument, what is wrong and what to
+//! do about it. Match on [`Error::kind`]; show the `Display` text to people.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,8 @@ pub enum ErrorKind {
     BundleCorrupt,
     /// A bundle is sound but of a format version this build does not read.
     BundleVersion,
-    /// A bundle's config and tensors disagree: missing tensor, wrong shape or dtype, size out of range.
+    /// A bundle's config and tensors disagree: missing tensor, wrong shape or dtype, size out of
+    /// range.
     BundleInvalid,
     /// A WAV file, or pushed audio, is not usable (not WAV, cut off, empty, bad rate, non-finite).
     Audio,
@@ -30,7 +31,8 @@ pub enum ErrorKind {
     State,
 }
 
-/// An error with its kind, its subject (a file, when there is one) and a message that tells what to do.
+/// An error with its kind, its subject (a file, when there is one) and a message that tells what to
+/// do.
 #[derive(Debug)]
 pub struct Error {
     kind: ErrorKind,

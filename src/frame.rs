@@ -16,7 +16,8 @@ pub const SAMPLE_RATE: u32 = 24_000;
 pub const FRAME_SAMPLES: usize = (SAMPLE_RATE / FPS) as usize;
 /// Audio samples in a block.
 pub const BLOCK_SAMPLES: usize = FRAME_SAMPLES * BLOCK_FRAMES;
-/// Explicit root channels at the head of a pose feature vector: `vx`, `vz` (m/frame), `dyaw` (rad/frame).
+/// Explicit root channels at the head of a pose feature vector: `vx`, `vz` (m/frame), `dyaw`
+/// (rad/frame).
 pub const ROOT_CHANNELS: usize = 3;
 /// Feature channels of a joint: 12 icosahedron vertices of 3 coordinates.
 pub const JOINT_CHANNELS: usize = 36;
@@ -71,7 +72,8 @@ impl Root {
         Quat::from_rotation_y(self.yaw as f32)
     }
 
-    /// The root one frame later: moved by `(vx, vz)` of this root's heading frame and turned by `dyaw`.
+    /// The root one frame later: moved by `(vx, vz)` of this root's heading frame and turned by
+    /// `dyaw`.
     #[must_use]
     pub fn advanced(&self, vx: f32, vz: f32, dyaw: f32) -> Self {
         let (s, c) = libm::sincos(self.yaw);
@@ -95,7 +97,8 @@ pub struct Frame {
     pub global: Vec<Transform>,
     /// World position of the hips for the fixed-bone-length rig, metres.
     pub hips: Vec3,
-    /// Rotation of each joint relative to its parent on the fixed-bone-length rig (hips: relative to the world).
+    /// Rotation of each joint relative to its parent on the fixed-bone-length rig (hips: relative
+    /// to the world).
     pub local: Vec<Quat>,
     /// Largest distance between a decoded joint position and the rig's, metres.
     pub fit_error: f32,
@@ -103,8 +106,8 @@ pub struct Frame {
     pub gaze: Option<f32>,
     /// What made this frame.
     pub sampler: Sampler,
-    /// How much of the frame is a held pose instead of the model's, 0 to 1: while the model cannot keep up, or gave what no
-    /// body can do, and in the cross-fade after that.
+    /// How much of the frame is a held pose instead of the model's, 0 to 1: while the model cannot
+    /// keep up, or gave what no body can do, and in the cross-fade after that.
     pub held: f32,
 }
 

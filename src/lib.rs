@@ -22,20 +22,22 @@ mod par;
 mod pose;
 #[cfg(feature = "quant")]
 mod quant;
+mod queue;
 mod rig;
 mod scheme;
 mod session;
 mod user;
 mod vae;
 
-pub use audio::Voice;
+pub use audio::{Speaker, VoiceInput};
 pub use bundle::{BundleFile, LoadMode};
 pub use engine::{Engine, Networks};
 pub use error::{Error, ErrorKind, Result};
 pub use frame::{BLOCK_FRAMES, EulerSteps, FPS, Frame, Root, SAMPLE_RATE, Sampler, Transform};
 pub use glam;
 pub use rig::{Joint, Rig};
-pub use session::{Budget, Governor, Session, SessionOptions, Team};
+pub use session::{Budget, Controls, Governor, Session, SessionOptions, SharedSession, Team};
+pub use user::HeadInput;
 
 /// What a session counts and measures ([`Session::stats`]).
 pub mod stats {
@@ -45,7 +47,8 @@ pub mod stats {
     pub use crate::user::TrackStats;
 }
 
-/// The governor's decisions, to record ([`Session::decisions`]) and to replay ([`Governor::Replay`]).
+/// The governor's decisions, to record ([`Session::decisions`]) and to replay
+/// ([`Governor::Replay`]).
 pub mod replay {
     pub use crate::session::{Decision, Hold, Plan};
 }
@@ -60,8 +63,8 @@ pub mod threads {
     pub use crate::par::{current_thread_id, pin_current_thread};
 }
 
-/// The rooms of this crate, for its own tools, tests, benchmarks and fuzz targets. Nothing in here keeps its shape from one
-/// version to the next, patches included.
+/// The rooms of this crate, for its own tools, tests, benchmarks and fuzz targets. Nothing in here
+/// keeps its shape from one version to the next, patches included.
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod internals {

@@ -1,4 +1,5 @@
-//! Sessions that go on: re-anchoring changes neither where the agent is nor how it moves, and numbers stay in range.
+//! Sessions that go on: re-anchoring changes neither where the agent is nor how it moves, and
+//! numbers stay in range.
 
 mod common;
 
@@ -63,7 +64,8 @@ fn ten_minutes_in_circles() {
     let (anchored, range, many) = drive(Anchoring::Every(60));
     assert_eq!(none, 0);
     assert!(many >= 40, "{many} anchorings in ten minutes");
-    // The world cannot jump: a re-anchoring moves no joint further in a frame than motion without it does.
+    // The world cannot jump: a re-anchoring moves no joint further in a frame than motion without
+    // it does.
     let (without, with) = (largest_step(&plain), largest_step(&anchored));
     println!("largest step without {without} m, with {with} m; latents {} and {}", plain_range.latent, range.latent);
     assert!(with < 1.5 * without, "largest step {with} m against {without} m without");

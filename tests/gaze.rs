@@ -1,4 +1,5 @@
-//! What a calibration of gaze changes: targets go through its curves, free gaze gets its levels, and nothing else.
+//! What a calibration of gaze changes: targets go through its curves, free gaze gets its levels,
+//! and nothing else.
 
 mod common;
 
@@ -62,7 +63,8 @@ fn unguided_is_neither_guided_nor_absent() {
     let unguided = motion(&engine, options(Some(0.3), GazeControl::Unguided));
     assert_ne!(unguided, motion(&engine, options(Some(0.3), GazeControl::Channel)));
     assert_ne!(unguided, motion(&engine, options(None, GazeControl::Channel)));
-    // Without a guidance weight of its own, a guided target has no effect; an unguided one still has.
+    // Without a guidance weight of its own, a guided target has no effect; an unguided one still
+    // has.
     let unweighted = |gaze, gaze_control| {
         let options = options(gaze, gaze_control);
         motion(&engine, SessionOptions { gaze_guidance: Some(0.0), ..options })

@@ -7,7 +7,8 @@ use visavis::internals::session::Anchoring;
 use visavis::replay::Hold;
 use visavis::{Budget, ErrorKind, Frame, Governor, Sampler, Session, SessionOptions};
 
-/// Milliseconds of the last block on a device that is `slow` times slower than one that does eight evaluations in 40 ms.
+/// Milliseconds of the last block on a device that is `slow` times slower than one that does eight
+/// evaluations in 40 ms.
 fn clock(session: &Session, slow: f64) -> f64 {
     let plan = session.decisions().last().expect("a decision").plan;
     let work = match plan.hold {
@@ -100,7 +101,8 @@ fn decisions_replay_bit_for_bit() {
     assert_eq!(again.decisions().collect::<Vec<_>>(), decisions);
 }
 
-/// Without a governor nothing depends on time; and the caller may take the choice back at any moment.
+/// Without a governor nothing depends on time; and the caller may take the choice back at any
+/// moment.
 #[test]
 fn a_pinned_sampler_stays() {
     let inputs = Inputs::circling(common::block_seconds(60), 24_000);
@@ -147,7 +149,8 @@ fn bad_budgets_and_times_are_refused() {
     session.report_block_time(5.0).unwrap();
 }
 
-/// The measured clock of `poll` works as well: on any computer the tiny model fits a generous budget.
+/// The measured clock of `poll` works as well: on any computer the tiny model fits a generous
+/// budget.
 #[test]
 fn without_a_reported_time_the_session_measures() {
     let mut session = tiny().session(options()).unwrap();

@@ -1,8 +1,9 @@
-//! Engines and sessions come and go without a trace: loaded, made, used and dropped, with no memory, thread or file left.
+//! Engines and sessions come and go without a trace: loaded, made, used and dropped, with no
+//! memory, thread or file left.
 //!
-//! `VISAVIS_CYCLES` sets the number of cycles; 300 by default, 10,000 in the figures of the README. Memory is what the allocator was
-//! asked for and not given back, to the byte; resident memory is told too. One test in one binary, so that no other test's threads and memory
-//! are counted.
+//! `VISAVIS_CYCLES` sets the number of cycles; 300 by default, 10,000 in the figures of the README.
+//! Memory is what the allocator was asked for and not given back, to the byte; resident memory is
+//! told too. One test in one binary, so that no other test's threads and memory are counted.
 #![cfg(target_os = "linux")]
 
 mod common;
@@ -97,8 +98,8 @@ fn engines_and_sessions_leave_nothing_behind() {
     );
     assert_eq!(before[3], after[3], "files are left open");
     assert!(after[0] - before[0] < SLACK, "{} bytes more in use after {cycles} cycles", after[0] - before[0]);
-    // A leak around the allocator (a mapping, a thread's stack) would be megabytes a cycle; what the C library keeps for the threads
-    // of 300 sessions was seen to be 12 MB.
+    // A leak around the allocator (a mapping, a thread's stack) would be megabytes a cycle; what
+    // the C library keeps for the threads of 300 sessions was seen to be 12 MB.
     let grown = after[1] - before[1];
     assert!(grown < 32 << 20, "{grown} bytes more resident after {cycles} cycles");
 }

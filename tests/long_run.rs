@@ -1,4 +1,5 @@
-//! After a day: everything that counts tokens, frames or samples is as precise as in the first minute.
+//! After a day: everything that counts tokens, frames or samples is as precise as in the first
+//! minute.
 
 mod common;
 
@@ -30,7 +31,8 @@ fn motion(first_block: u64, sampler: Sampler) -> (Vec<Frame>, Session) {
     session.push_agent_audio(&inputs.agent, inputs.rate).unwrap();
     session.push_user_audio(&inputs.user, inputs.rate).unwrap();
     for (i, (t, p)) in inputs.path.iter().enumerate() {
-        // Every third sample falls on a frame, to the bit; what lies between two samples would depend on how their times round.
+        // Every third sample falls on a frame, to the bit; what lies between two samples would
+        // depend on how their times round.
         let frame = first_block * BLOCK_FRAMES as u64 + i as u64 / 3;
         let time = if i % 3 == 0 { frame as f64 / f64::from(FPS) } else { start + t };
         session.push_user_head(*p, time).unwrap();
@@ -38,7 +40,8 @@ fn motion(first_block: u64, sampler: Sampler) -> (Vec<Frame>, Session) {
     (poll_blocks(&mut session, BLOCKS), session)
 }
 
-/// All phases come again after a period: everything else that knows the time must not change a bit either.
+/// All phases come again after a period: everything else that knows the time must not change a bit
+/// either.
 #[test]
 fn whole_periods_later_motion_has_the_same_bits() {
     for sampler in [Sampler::Midpoint4, Sampler::Single] {
@@ -54,7 +57,8 @@ fn whole_periods_later_motion_has_the_same_bits() {
     }
 }
 
-/// Positions of tokens enter through rotary phases, which are relative: but for their rounding, motion does not know the hour.
+/// Positions of tokens enter through rotary phases, which are relative: but for their rounding,
+/// motion does not know the hour.
 #[test]
 fn a_day_later_motion_is_the_same() {
     for sampler in [Sampler::Midpoint4, Sampler::Single] {

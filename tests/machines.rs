@@ -1,8 +1,10 @@
-//! The same motion on every machine: digests of all bits of all frames, compared with `tests/goldens/digests.txt`.
+//! The same motion on every machine: digests of all bits of all frames, compared with
+//! `tests/goldens/digests.txt`.
 //!
-//! Whatever changes the numbers on purpose (pose stage, stance, samplers, guidance, anchoring, the tiny bundle) changes the
-//! digests: run `VISAVIS_DIGESTS=write cargo test --test machines` and commit the file. A difference between two machines
-//! is a fault: sums must have a fixed order, and functions such as sine must come from `libm`, not from the platform.
+//! Whatever changes the numbers on purpose (pose stage, stance, samplers, guidance, anchoring, the
+//! tiny bundle) changes the digests: run `VISAVIS_DIGESTS=write cargo test --test machines` and
+//! commit the file. A difference between two machines is a fault: sums must have a fixed order, and
+//! functions such as sine must come from `libm`, not from the platform.
 
 mod common;
 

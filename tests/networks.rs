@@ -1,4 +1,5 @@
-//! Engines that hold some networks of a bundle only: the same motion in less memory, and typed refusals.
+//! Engines that hold some networks of a bundle only: the same motion in less memory, and typed
+//! refusals.
 
 mod common;
 
@@ -37,7 +38,8 @@ fn what_is_left_makes_the_same_motion_in_less_memory() {
     }
 }
 
-/// A quantised copy of the tiny bundle: it holds latents of the idle clip, so a lean engine reads no encoder.
+/// A quantised copy of the tiny bundle: it holds latents of the idle clip, so a lean engine reads
+/// no encoder.
 fn quantised() -> Vec<u8> {
     let file = BundleFile::open(golden_path("tiny.safetensors")).expect("the tiny bundle opens");
     let options = Options { scheme: Scheme::I8, smallest: 0, keep: &[], calibration: None, budget: None };

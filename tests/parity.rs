@@ -1,7 +1,7 @@
 //! The runtime equals PyTorch, stage by stage: 1e-4 in fp32.
 //!
-//! The golden file was computed without caches, every token anew at each evaluation, over more than three windows; so
-//! these tests also show that the cache of each slot is exact.
+//! The golden file was computed without caches, every token anew at each evaluation, over more than
+//! three windows; so these tests also show that the cache of each slot is exact.
 
 mod common;
 
@@ -115,8 +115,8 @@ fn clean_history_equals_pytorch() {
     assert!(max_error(&golden.values("latents.clean"), &golden.values("latents")) > 0.01, "it is another sampler");
 }
 
-/// fp16 rounds keys and values to 11 bits (relative 5e-4); over 20 free-running blocks with random weights that stays
-/// below 2e-2 of a latent of unit scale.
+/// fp16 rounds keys and values to 11 bits (relative 5e-4); over 20 free-running blocks with random
+/// weights that stays below 2e-2 of a latent of unit scale.
 #[test]
 fn fp16_cache_stays_close() {
     let golden = Golden::load();

@@ -1,4 +1,5 @@
-//! Quantised bundles: made alike every time, loaded with checks, and close to what they were made from.
+//! Quantised bundles: made alike every time, loaded with checks, and close to what they were made
+//! from.
 
 mod common;
 
@@ -65,8 +66,9 @@ fn blocks_stay_close_in_the_order_of_the_schemes() {
     }
 }
 
-/// What is measured is what a session does: the reference's free run has the bits of a plain session that is driven as any caller drives
-/// it, with free gaze, whose levels are drawn from the calibration, and with a target.
+/// What is measured is what a session does: the reference's free run has the bits of a plain
+/// session that is driven as any caller drives it, with free gaze, whose levels are drawn from the
+/// calibration, and with a target.
 #[test]
 fn the_teacher_runs_as_a_plain_session_does() {
     let engine = with_gaze();
@@ -104,7 +106,8 @@ fn another_calibration_is_refused() {
     assert!(e.kind() == ErrorKind::Argument && e.to_string().contains("calibration"), "{e}");
 }
 
-/// Rounding for the inputs that layers get: better blocks of the same size, and the same bytes every time.
+/// Rounding for the inputs that layers get: better blocks of the same size, and the same bytes
+/// every time.
 #[test]
 fn calibrated_rounding_loses_less() {
     let reference = Engine::from_file(&tiny_f32(), Kernels::detect().unwrap()).unwrap();
@@ -147,7 +150,8 @@ fn sessions_have_the_same_bits_on_every_level_and_with_two_threads() {
     }
 }
 
-/// The networks' transformer layers, where the time goes, take int8; every name that the rule speaks of is that of a layer.
+/// The networks' transformer layers, where the time goes, take int8; every name that the rule
+/// speaks of is that of a layer.
 #[test]
 fn int16_activations_are_those_of_named_layers() {
     let tensors = infos(&tiny_f32());
@@ -224,7 +228,8 @@ fn damaged_schemes_are_typed_errors() {
     assert!(e.kind() == invalid && e.to_string().contains("shape"), "{e}");
 }
 
-/// A flipped bit of a value makes another value; of a scale perhaps one that is refused, and nothing worse.
+/// A flipped bit of a value makes another value; of a scale perhaps one that is refused, and
+/// nothing worse.
 #[test]
 fn flipped_bits_are_errors_or_harmless() {
     for scheme in [Scheme::I8, Scheme::I4] {
@@ -245,7 +250,8 @@ fn flipped_bits_are_errors_or_harmless() {
     }
 }
 
-/// Half the bytes of f32, by every tensor but the statistics, and the idle clip as the latents that the encoder makes of it.
+/// Half the bytes of f32, by every tensor but the statistics, and the idle clip as the latents that
+/// the encoder makes of it.
 #[test]
 fn a_bundle_of_halves_is_half_a_bundle() {
     let file = tiny_f32();

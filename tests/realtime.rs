@@ -1,16 +1,21 @@
 //! A running session computes blocks without allocating: proved with an allocator that counts.
 //!
-//! One test in one binary, without the test harness: its threads allocate too, as when it tells that a test takes long.
+//! One test in one binary, without the test harness: its threads allocate too, as when it tells
+//! that a test takes long.
 
 mod common;
 
 use common::{Inputs, tiny, tiny_in};
+use glam::Vec3;
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
 use visavis::internals::kernels::Scheme;
 use visavis::internals::session::Anchoring;
 use visavis::replay::Hold;
-use visavis::{Budget, Governor, Sampler, SessionOptions};
+use visavis::{Budget, Governor, Sampler, Session, SessionOptions, Speaker};
 
 /// The system's allocator, counting what is asked of it while `WATCH` is set.
 struct Counting;
@@ -41,7 +46,8 @@ unsafe impl GlobalAlloc for Counting {
 
     unsafe fn realloc(&self, ptr: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         count();
-        // SAFETY: `ptr` came from `System` with this layout; the caller keeps the contract of `realloc`.
+        // SAFETY: `ptr` came from `System` with this layout; the caller keeps the contract of
+        // `realloc`.
         unsafe { System.realloc(ptr, layout, size) }
     }
 }
@@ -57,9 +63,62 @@ fn allocations(work: impl FnOnce()) -> u64 {
     CALLS.load(Ordering::SeqCst)
 }
 
-/// Every sampler, one and two threads, gaze on and off, sampler changes with their catching up, re-anchoring, the governor,
-/// voices of a rate that is resampled, weights of every scheme: after the first push of each voice, neither pushing nor
-/// computing allocates.
+/// A thread that pushes into a session and sets what it goes by, as trackers, microphones and user
+/// interfaces do.
+struct Beside {
+    rounds: Arc<AtomicU64>,
+    stop: Arc<AtomicBool>,
+    thread: JoinHandle<()>,
+}
+
+impl Beside {
+    /// Starts it; the first pushes have been made when it returns.
+    fn start(session: &Session) -> Self {
+        let voices = [Speaker::Agent, Speaker::User].map(|speaker| session.voice_input(speaker));
+        let (head, controls, now) = (session.head_input(), session.controls(), session.next_due());
+        let (rounds, stop) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicBool::new(false)));
+        let (counting, stopped) = (Arc::clone(&rounds), Arc::clone(&stop));
+        let thread = std::thread::spawn(move || {
+            let sound = [0.1; 480];
+            for round in 0u32.. {
+                voices.iter().for_each(|voice| voice.push(&sound, 48_000).unwrap());
+                match round % 16 {
+                    3 => voices[0].finish(),
+                    7 => voices[0].clear(),
+                    11 => voices[1].set_present(round % 32 > 16),
+                    _ => head.push(Vec3::new(0.0, 1.6, 2.0), now + f64::from(round) * 0.01),
+                }
+                controls.set_gaze((round % 2 > 0).then_some(0.5)).unwrap();
+                controls.set_guidance(1.3, 2.5).unwrap();
+                controls.set_sampler([Sampler::Single, Sampler::Midpoint4][round as usize % 2]).unwrap();
+                counting.fetch_add(1, Ordering::Release);
+                if stopped.load(Ordering::Acquire) {
+                    return;
+                }
+                std::thread::sleep(Duration::from_micros(200));
+            }
+        });
+        let beside = Self { rounds, stop, thread };
+        while beside.rounds() == 0 {
+            std::thread::yield_now();
+        }
+        beside
+    }
+
+    fn rounds(&self) -> u64 {
+        self.rounds.load(Ordering::Acquire)
+    }
+
+    fn end(self) {
+        self.stop.store(true, Ordering::Release);
+        self.thread.join().unwrap();
+    }
+}
+
+/// Every sampler, one and two threads, gaze on and off, sampler changes with their catching up,
+/// re-anchoring, the governor, voices of a rate that is resampled, weights of every scheme: after
+/// the first push of each voice, neither pushing nor computing allocates; nor does another thread
+/// that pushes and sets meanwhile.
 fn a_running_session_does_not_allocate() {
     assert!(allocations(|| drop(std::hint::black_box(vec![1u8]))) > 0, "the allocator counts");
     let inputs = Inputs::circling(20.0, 48_000);
@@ -93,7 +152,22 @@ fn a_running_session_does_not_allocate() {
         assert_eq!(calls, 0, "allocations with {threads} threads");
         assert!(session.stats().anchorings > 0, "re-anchoring was among what ran");
 
-        // The governor with all it does: down the ladder, holding, rehearsing, catching up, and its record of that.
+        let beside = Beside::start(&session);
+        let calls = allocations(|| {
+            let until = beside.rounds() + 20;
+            for block in 0.. {
+                if block >= 60 && beside.rounds() >= until {
+                    break;
+                }
+                std::hint::black_box(session.poll(session.next_due()).unwrap().unwrap());
+            }
+        });
+        assert_eq!(calls, 0, "allocations beside a thread that pushes, with {threads} threads");
+        beside.end();
+        session.set_gaze(None).unwrap();
+
+        // The governor with all it does: down the ladder, holding, rehearsing, catching up, and its
+        // record of that.
         session.set_sampler(Sampler::Midpoint4).unwrap();
         session.set_governor(Governor::Budget(Budget::default())).unwrap();
         let calls = allocations(|| {

@@ -1,17 +1,19 @@
-//! Computing blocks makes no system call: proved by computing them where one would be fatal.
+//! Neither computing blocks nor pushing makes a system call: proved by computing them where one
+//! would be fatal.
 //!
-//! A child process installs a seccomp filter with which the kernel kills it at any system call but write and exit (and the
-//! clock's, which `poll` reads before and after a block, and which is none where the kernel maps the clock). It computes
-//! blocks and writes one byte to say that it is through. Sleeping on a contended lock, allocating from the system,
-//! starting a thread or reading the environment would all be fatal. One test in one binary: the child of a fork has
-//! only the thread that forked.
+//! A child process installs a seccomp filter with which the kernel kills it at any system call but
+//! write and exit (and the clock's, which `poll` reads before and after a block, and which is none
+//! where the kernel maps the clock). It computes blocks and writes one byte to say that it is
+//! through. Sleeping on a contended lock, allocating from the system, starting a thread or reading
+//! the environment would all be fatal. One test in one binary: the child of a fork has only the
+//! thread that forked.
 #![cfg(target_os = "linux")]
 #![allow(unsafe_code, reason = "fork, prctl and exit are unsafe by nature")]
 
 mod common;
 
 use common::{Inputs, tiny};
-use visavis::{Budget, Governor, Sampler, Session, SessionOptions};
+use visavis::{Budget, Governor, Sampler, Session, SessionOptions, Speaker};
 
 /// What became of a child that ran `work` under the filter.
 #[derive(Debug, PartialEq)]
@@ -28,7 +30,8 @@ fn confined(work: impl FnOnce()) -> Fate {
     let mut ends = [0; 2];
     // SAFETY: `ends` has room for both ends of the pipe.
     assert_eq!(unsafe { libc::pipe(ends.as_mut_ptr()) }, 0);
-    // SAFETY: the child calls nothing that needs another thread: neither it nor the blocks it computes allocate or lock.
+    // SAFETY: the child calls nothing that needs another thread: neither it nor the blocks it
+    // computes allocate or lock.
     let child = unsafe { libc::fork() };
     assert!(child >= 0, "fork");
     if child == 0 {
@@ -76,7 +79,8 @@ fn confine() -> bool {
         step(RETURN, libc::SECCOMP_RET_ALLOW, 0),
     ];
     let filter = libc::sock_fprog { len: program.len() as u16, filter: program.as_mut_ptr() };
-    // SAFETY: plain numbers; `filter` and the program it points to outlive the call, which copies them.
+    // SAFETY: plain numbers; `filter` and the program it points to outlive the call, which copies
+    // them.
     unsafe {
         libc::prctl(libc::PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0
             && libc::prctl(libc::PR_SET_SECCOMP, libc::SECCOMP_MODE_FILTER, std::ptr::from_ref(&filter)) == 0
@@ -106,6 +110,26 @@ fn blocks_make_no_system_call() {
         fate => assert_eq!(fate, Fate::Killed, "a system call is fatal in the child"),
     }
     assert_eq!(confined(|| compute(&mut session, 40)), Fate::Through);
+
+    let (voice, head, controls) = (session.voice_input(Speaker::User), session.head_input(), session.controls());
+    let sound = [0.1; 480];
+    let mut pushed = || {
+        for i in 0..40 {
+            let mut all = voice.push(&sound, inputs.rate).is_ok();
+            match i % 8 {
+                1 => voice.finish(),
+                3 => voice.clear(),
+                5 => voice.set_present(i < 20),
+                _ => head.push(glam::Vec3::new(0.0, 1.6, 2.0), session.next_due()),
+            }
+            all &= controls.set_gaze((i % 2 > 0).then_some(0.5)).is_ok();
+            all &= controls.set_sampler([Sampler::Single, Sampler::Midpoint4][i % 2]).is_ok();
+            let now = session.next_due();
+            // A panic calls the system, which is fatal.
+            assert!(all && session.poll(now).is_ok_and(|frames| frames.is_some()));
+        }
+    };
+    assert_eq!(confined(&mut pushed), Fate::Through);
 
     session.set_governor(Governor::Budget(Budget::default())).unwrap();
     let governed = |session: &mut Session| {

@@ -41,4 +41,14 @@ val sampleAssets by tasks.registering(Copy::class) {
     into(layout.buildDirectory.dir("sampleAssets"))
 }
 
-tasks.named("preBuild") { dependsOn(sampleAssets) }
+// Body, shaders and colours of the live page; takes Node.js.
+val stageAsset by tasks.registering(Exec::class) {
+    dependsOn(sampleAssets) // into the same folder, after it
+    val model = file("../../models/visavis-base-i8.safetensors")
+    val stage = layout.buildDirectory.dir("sampleAssets").get().asFile.resolve("stage.bin")
+    inputs.files(file("../apk/stage.mjs"), fileTree("../../tools/src/export/viewer/page"), model)
+    outputs.file(stage)
+    commandLine("node", "../apk/stage.mjs", model.path, stage.path)
+}
+
+tasks.named("preBuild") { dependsOn(stageAsset) }

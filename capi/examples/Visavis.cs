@@ -26,6 +26,13 @@ namespace Visavis
         Other = 12,
     }
 
+    /// The voice of a push or a command: visavis_voice.
+    public enum Speaker
+    {
+        Agent = 0,
+        User = 1,
+    }
+
     public enum SamplerKind
     {
         Midpoint = 0,
@@ -82,12 +89,14 @@ namespace Visavis
         public VoiceStats AgentVoice, UserVoice;
         public ulong HeadAccepted, HeadNonFinite, HeadOutOfOrder, HeadAbsurd, HeadTeleports, HeadOverwritten;
         public ulong GovernorMissed, GovernorDown, GovernorUp, GovernorHeldBlocks, GovernorCatchUpPasses, GuardTrips, GuardHeldFrames;
+        public ulong AgentNonFiniteSamples, AgentBadRateSamples, AgentContendedSamples;
+        public ulong UserNonFiniteSamples, UserBadRateSamples, UserContendedSamples;
     }
 
     internal static class Native
     {
         const string Library = "visavis_c";
-        public const uint AbiVersion = 0x10000;
+        public const uint AbiVersion = 0x10001;
 
         [DllImport(Library)] public static extern uint visavis_abi_version();
         [DllImport(Library)] public static extern Status visavis_check_abi(uint abiVersion);
@@ -189,14 +198,38 @@ namespace Visavis
             Joints = new Joint[BlockFrames * joints];
         }
 
-        public void PushAgentAudio(float[] samples, int rate) =>
-            Engine.Check(Native.visavis_session_push_agent_audio(handle, samples, (UIntPtr)samples.Length, (uint)rate));
+        // Pushes, commands and settings: from any thread, such as OnAudioFilterRead of a microphone and the update of a tracker. They
+        // never wait for Poll, and a block goes by what came before its Poll began. One thread pushes the sound of a voice.
 
-        public void PushUserAudio(float[] samples, int rate) =>
-            Engine.Check(Native.visavis_session_push_user_audio(handle, samples, (UIntPtr)samples.Length, (uint)rate));
+        /// Appends samples; more than a minute ahead is dropped and counted. Samples that are not finite become
+        /// silence, and are told by an exception after all others were taken.
+        public void PushAudio(Speaker speaker, float[] samples, int rate)
+        {
+            var count = (UIntPtr)samples.Length;
+            Engine.Check(speaker == Speaker.Agent
+                ? Native.visavis_session_push_agent_audio(handle, samples, count, (uint)rate)
+                : Native.visavis_session_push_user_audio(handle, samples, count, (uint)rate));
+        }
 
+        public void PushAgentAudio(float[] samples, int rate) => PushAudio(Speaker.Agent, samples, rate);
+
+        public void PushUserAudio(float[] samples, int rate) => PushAudio(Speaker.User, samples, rate);
+
+        /// Ends an utterance: the last milliseconds come out. Optional.
+        public void FinishAudio(Speaker speaker) => Engine.Check(Native.visavis_session_finish_audio(handle, (int)speaker));
+
+        /// Breaks an utterance off.
+        public void ClearAudio(Speaker speaker) => Engine.Check(Native.visavis_session_clear_audio(handle, (int)speaker));
+
+        /// Positions are put in order by time; those that are late are counted.
         public void PushUserHead(float x, float y, float z, double time) =>
             Engine.Check(Native.visavis_session_push_user_head(handle, x, y, z, time));
+
+        /// 0 averted, 1 sustained eye contact; null leaves it to the model.
+        public void SetGaze(float? target) =>
+            Engine.Check(target.HasValue ? Native.visavis_session_set_gaze(handle, target.Value) : Native.visavis_session_set_natural_gaze(handle));
+
+        // What follows is one thread's at a time: Status.Busy otherwise.
 
         /// True when four frames have come; call it until it is false.
         public bool Poll(double now)

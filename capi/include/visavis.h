@@ -8,15 +8,20 @@
  *  - visavis_engine and visavis_session are opaque. Who makes one frees it, once, with visavis_engine_free or
  *    visavis_session_free; freeing NULL does nothing. A session keeps what it needs of its engine: the order of
  *    freeing is free. A pointer that was freed must not be used again.
- *  - Arrays that are passed in stay the caller's and are not kept: they may be changed or freed when the call has returned. A file
- *    descriptor stays the caller's and may be closed when the call has returned.
+ *  - Arrays that are passed in stay the caller's and are not kept: they may be changed or freed when the call has returned, not
+ *    before. A file descriptor stays the caller's and may be closed when the call has returned.
  *  - Arrays and structs that are filled belong to the caller, who gives their size; nothing is written beyond it.
  *  - Strings that are returned belong to the library and must not be freed: names live as long as their engine,
  *    visavis_last_error's text until the next call of this library by the same thread, visavis_version's for ever.
  *
  * THREADS
- *  - An engine may be used by any number of threads at once. A session may move between threads, but one thread at a time: a call
- *    while another thread is inside the same session returns VISAVIS_STATUS_BUSY and does nothing.
+ *  - An engine may be used by any number of threads at once, and so may the inputs and settings of a session: the functions push, finish,
+ *    clear, set and report. They never wait for a block or for another thread, and never return VISAVIS_STATUS_BUSY, whatever the others
+ *    do. A block goes by what came before its poll began: the same inputs give the same motion, whichever threads they come from. A
+ *    voice is one stream: one thread pushes its sound, while commands may come from others. After the first push of a voice, or
+ *    of another rate, pushing does not allocate.
+ *  - All other functions of a session, poll, reset and stats among them, are one thread's at a time, though not always the same one's: such
+ *    a call while another one is under way returns VISAVIS_STATUS_BUSY and does nothing. Freeing is the last call of all.
  *
  * ERRORS
  *  - Functions that can fail return VISAVIS_STATUS_OK (0) or a reason; visavis_last_error then says what is wrong and
@@ -27,7 +32,8 @@
  * VERSIONS
  *  - Call visavis_check_abi(VISAVIS_ABI_VERSION) once. Same major number and a library at least as new as the
  *    header fit together. Structs grow at their end only; each says how large the caller believes it to be (struct_size, or an argument),
- *    so that an old program runs with a new library.
+ *    so that an old program runs with a new library. visavis_joint and visavis_voice_stats never grow. A program that is newer than
+ *    its library is refused with VISAVIS_STATUS_ABI, by visavis_check_abi and where it uses an option that the library does not know.
  */
 
 
@@ -42,8 +48,8 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-// Version of this interface: major number in the upper 16 bits, minor in the lower.
-#define VISAVIS_ABI_VERSION (1 << 16)
+// Version of this interface, 1.1: major number in the upper 16 bits, minor in the lower.
+#define VISAVIS_ABI_VERSION ((1 << 16) | 1)
 
 // Frames that a poll gives when a block is due.
 #define VISAVIS_BLOCK_FRAMES 4
@@ -66,13 +72,14 @@ enum visavis_status
     VISAVIS_STATUS_BUNDLE_VERSION = 4,
     // The bundle's config and tensors disagree.
     VISAVIS_STATUS_BUNDLE_INVALID = 5,
-    // Audio of a bad rate, or samples that are not finite; nothing of the push was taken.
+    // Audio of a bad rate, of which nothing was taken, or samples that are not finite, in whose
+    // place there is silence.
     VISAVIS_STATUS_AUDIO = 6,
     // The call does not fit the session's state, for example time that runs backwards.
     VISAVIS_STATUS_STATE = 7,
     // VISAVIS_CPU asks for a level that this CPU does not have.
     VISAVIS_STATUS_CPU_LEVEL = 8,
-    // Another thread is inside this session.
+    // Another thread is inside this session. Pushes and settings never meet this.
     VISAVIS_STATUS_BUSY = 9,
     // Program and library do not fit together.
     VISAVIS_STATUS_ABI = 10,
@@ -158,17 +165,20 @@ typedef struct visavis_session visavis_session;
 typedef struct visavis_session_options {
     // sizeof(visavis_session_options).
     uint32_t struct_size;
-    // Threads that compute a block, 1 (the caller of visavis_session_poll) or 2; the motion is the same. Default 1.
+    // Threads that compute a block, 1 (the caller of visavis_session_poll) or 2; the motion is the
+    // same. Default 1.
     uint32_t threads;
     // Same seed and same inputs: same motion, bit for bit. Default 0.
     uint64_t seed;
-    // Cores that the second thread may run on, bit i for core i; 0 (default): any. Linux and Android.
+    // Cores that the second thread may run on, bit i for core i; 0 (default): any. Linux and
+    // Android.
     uint64_t core_mask;
     // A visavis_sampler_kind; default midpoint.
     int32_t sampler_kind;
     // Steps of the sampler; default 4.
     uint32_t sampler_steps;
-    // Gaze target, 0 (averted) to 1 (sustained eye contact), negative to -1; NaN (default): what comes naturally.
+    // Gaze target, 0 (averted) to 1 (sustained eye contact), negative to -1; NaN (default): what
+    // comes naturally.
     float gaze;
     // Guidance weight, 0 to 20; NaN (default): the bundle's.
     float guidance;
@@ -176,7 +186,8 @@ typedef struct visavis_session_options {
     float gaze_guidance;
     // Scale of the noise, 0 to 2; less is calmer. NaN (default): the bundle's.
     float temperature;
-    // Where the agent stands at the start: x and z, metres; heading, radians (0 faces +Z, positive turns towards +X).
+    // Where the agent stands at the start: x and z, metres; heading, radians (0 faces +Z, positive
+    // turns towards +X).
     double start_x;
     // See start_x.
     double start_z;
@@ -186,8 +197,9 @@ typedef struct visavis_session_options {
     uint32_t stance;
     // Whether frames that no body could show are replaced by a held pose; 1 by default.
     uint32_t guard;
-    // Milliseconds that a block may take, 1 to 133.3: a governor then chooses the sampler of each block, the session's
-    // sampler at best, so that none comes late. 0 (default): the session's sampler, always.
+    // Milliseconds that a block may take, 1 to 133.3: a governor then chooses the sampler of each
+    // block, the session's sampler at best, so that none comes late. 0 (default): the session's
+    // sampler, always.
     float budget_ms;
     // 0.
     uint32_t reserved;
@@ -221,7 +233,8 @@ typedef struct visavis_frame {
 
 // One joint of a frame. Quaternions are x, y, z, w.
 typedef struct visavis_joint {
-    // Rotation relative to the parent on the rig with fixed bone lengths (hips: relative to the world): for humanoid rigs.
+    // Rotation relative to the parent on the rig with fixed bone lengths (hips: relative to the
+    // world): for humanoid rigs.
     float local[4];
     // Decoded position in the world.
     float position[3];
@@ -255,7 +268,8 @@ typedef struct visavis_stats {
     double block_ms_p99;
     // Maximum.
     double block_ms_max;
-    // From something that the user does to the start of the first block that can answer, at most, milliseconds.
+    // From something that the user does to the start of the first block that can answer, at most,
+    // milliseconds.
     double user_delay_ms;
     // The same for the agent's own voice; 0 when it is known ahead.
     double agent_delay_ms;
@@ -271,7 +285,7 @@ typedef struct visavis_stats {
     uint64_t head_accepted;
     // Ignored: not finite.
     uint64_t head_non_finite;
-    // Ignored: not later than the one before.
+    // Ignored: late (a block has used one of that time or later), or at the time of another.
     uint64_t head_out_of_order;
     // Ignored: more than 1 km from the origin, or a time of more than 10 million seconds.
     uint64_t head_absurd;
@@ -293,6 +307,19 @@ typedef struct visavis_stats {
     uint64_t guard_trips;
     // Frames that it held, or faded back.
     uint64_t guard_held_frames;
+    // Since interface 1.1. The agent's voice, input samples: not finite, which silence replaced.
+    uint64_t agent_non_finite_samples;
+    // Pushed at a rate out of range and not taken.
+    uint64_t agent_bad_rate_samples;
+    // Dropped because another thread was inside this voice's input and lost its core there for
+    // long.
+    uint64_t agent_contended_samples;
+    // The same for the user's voice.
+    uint64_t user_non_finite_samples;
+    // See agent_bad_rate_samples.
+    uint64_t user_bad_rate_samples;
+    // See agent_contended_samples.
+    uint64_t user_contended_samples;
 } visavis_stats;
 
 #ifdef __cplusplus
@@ -311,12 +338,10 @@ const char *visavis_version(void);
 // Loads the bundle at `path` (UTF-8).
 visavis_status visavis_engine_from_path(const char *path, struct visavis_engine **engine);
 
-// Loads the bundle that lies in an open file, `length` bytes from `offset` on (`length` 0: up to the end), such as an asset
-// stored uncompressed in an APK. The descriptor's read position is not used or moved. Not on Windows.
-visavis_status visavis_engine_from_fd(int32_t fd,
-                                      uint64_t offset,
-                                      uint64_t length,
-                                      struct visavis_engine **engine);
+// Loads the bundle that lies in an open file, `length` bytes from `offset` on (`length` 0: up to
+// the end), such as an asset stored uncompressed in an APK. The descriptor's read position is not
+// used or moved. Not on Windows.
+visavis_status visavis_engine_from_fd(int32_t fd, uint64_t offset, uint64_t length, struct visavis_engine **engine);
 
 // Loads a bundle from `length` bytes of memory, which are not needed afterwards.
 visavis_status visavis_engine_from_memory(const uint8_t *bytes, size_t length, struct visavis_engine **engine);
@@ -333,24 +358,27 @@ uint32_t visavis_engine_joint_count(const struct visavis_engine *engine);
 // Name of a joint (VRM humanoid); NULL for a joint that is not there.
 const char *visavis_engine_joint_name(const struct visavis_engine *engine, uint32_t joint);
 
-// Parent of a joint into `parent` (-1: none), and its rest offset from there into `offset[3]`, metres. Either may be NULL.
+// Parent of a joint into `parent` (-1: none), and its rest offset from there into `offset[3]`,
+// metres. Either may be NULL.
 visavis_status visavis_engine_joint(const struct visavis_engine *engine,
                                     uint32_t joint,
                                     int32_t *parent,
                                     float *offset);
 
-// Number in OpenXR's `body` (a visavis_body) of the joint that stands for a joint of this engine; -1 if it has none.
+// Number in OpenXR's `body` (a visavis_body) of the joint that stands for a joint of this engine;
+// -1 if it has none.
 int32_t visavis_engine_openxr_joint(const struct visavis_engine *engine, uint32_t joint, int32_t body);
 
-// Joint of this engine that OpenXR's body joint `openxr_joint` (below 84) follows: its own, or the nearest one towards the
-// hips; -1 for the root, which is the agent's place on the floor, and for numbers out of range.
-int32_t visavis_engine_joint_for_openxr(const struct visavis_engine *engine,
-                                        uint32_t openxr_joint);
+// Joint of this engine that OpenXR's body joint `openxr_joint` (below 84) follows: its own, or the
+// nearest one towards the hips; -1 for the root, which is the agent's place on the floor, and for
+// numbers out of range.
+int32_t visavis_engine_joint_for_openxr(const struct visavis_engine *engine, uint32_t openxr_joint);
 
 // Fills `options` with the defaults; `struct_size` is sizeof(visavis_session_options).
 visavis_status visavis_session_options_init(struct visavis_session_options *options, size_t struct_size);
 
-// Starts a session on `engine`; `options` may be NULL for the defaults. All its memory is taken here.
+// Starts a session on `engine`; `options` may be NULL for the defaults. All its memory is taken
+// here.
 visavis_status visavis_session_new(const struct visavis_engine *engine,
                                    const struct visavis_session_options *options,
                                    struct visavis_session **session);
@@ -358,9 +386,12 @@ visavis_status visavis_session_new(const struct visavis_engine *engine,
 // Frees a session.
 void visavis_session_free(struct visavis_session *session);
 
-// Appends to the agent's own voice: `count` mono samples, full scale 1, of `rate` Hz (8000 to 192000), up to a minute ahead
-// of time. More is dropped and counted. Sound that has not come when a block is computed is silence there, is counted, and
-// is heard later. A voice that was never pushed is absent, which is not the same as silent.
+// Appends to the agent's own voice: `count` mono samples, full scale 1, of `rate` Hz (8000 to
+// 192000), up to a minute ahead of time. More is dropped and counted. Sound that has not come when
+// a block is computed is silence there, is counted, and is heard later. A voice that was never
+// pushed is absent, which is not the same as silent. Samples that are not finite become silence,
+// are counted, and make the status VISAVIS_STATUS_AUDIO; all others are taken. From any thread,
+// see THREADS.
 visavis_status visavis_session_push_agent_audio(struct visavis_session *session,
                                                 const float *samples,
                                                 size_t count,
@@ -372,25 +403,22 @@ visavis_status visavis_session_push_user_audio(struct visavis_session *session,
                                                size_t count,
                                                uint32_t rate);
 
-// Ends an utterance of a voice (a visavis_voice): the last milliseconds, which wait in the resampler, come out. Optional.
-visavis_status visavis_session_finish_audio(struct visavis_session *session,
-                                            int32_t which);
+// Ends an utterance of a voice (a visavis_voice): the last milliseconds, which wait in the
+// resampler, come out. Optional.
+visavis_status visavis_session_finish_audio(struct visavis_session *session, int32_t which);
 
-// Drops all sound of a voice (a visavis_voice) that has not been used, as when an utterance is broken off.
+// Drops all sound of a voice (a visavis_voice) that has not been used, as when an utterance is
+// broken off.
 visavis_status visavis_session_clear_audio(struct visavis_session *session, int32_t which);
 
-// Makes a voice (a visavis_voice) present, silent until something is pushed (`present` not 0), or absent until the next push (0).
-visavis_status visavis_session_set_audio_present(struct visavis_session *session,
-                                                 int32_t which,
-                                                 int32_t present);
+// Makes a voice (a visavis_voice) present, silent until something is pushed (`present` not 0), or
+// absent until the next push (0).
+visavis_status visavis_session_set_audio_present(struct visavis_session *session, int32_t which, int32_t present);
 
-// Tells where the user's head is (midpoint of the eyes), world metres, at `time` seconds of session time. Any rate; positions
-// that are not finite, out of order or impossible are ignored and counted (visavis_stats).
-visavis_status visavis_session_push_user_head(struct visavis_session *session,
-                                              float x,
-                                              float y,
-                                              float z,
-                                              double time);
+// Tells where the user's head is (midpoint of the eyes), world metres, at `time` seconds of
+// session time. Any rate; positions are put in order by time. Those that are late, not finite or
+// impossible are ignored and counted (visavis_stats). From any thread.
+visavis_status visavis_session_push_user_head(struct visavis_session *session, float x, float y, float z, double time);
 
 // Sets the gaze target from the next block on: 0 averted, 1 sustained eye contact.
 visavis_status visavis_session_set_gaze(struct visavis_session *session, float target);
@@ -398,28 +426,28 @@ visavis_status visavis_session_set_gaze(struct visavis_session *session, float t
 // Leaves the gaze to the model from the next block on.
 visavis_status visavis_session_set_natural_gaze(struct visavis_session *session);
 
-// Sets the guidance weights, 0 to 20: of the conditioning as a whole (1 is none), and of the gaze target.
+// Sets the guidance weights, 0 to 20: of the conditioning as a whole (1 is none), and of the gaze
+// target.
 visavis_status visavis_session_set_guidance(struct visavis_session *session, float weight, float gaze);
 
 // Sets the sampler from the next block on; `kind` is a visavis_sampler_kind.
 visavis_status visavis_session_set_sampler(struct visavis_session *session, int32_t kind, uint32_t steps);
 
-// Sets the milliseconds that a block may take, 1 to 133.3, from the next block on: a governor then chooses the sampler of
-// each block, the session's at best. 0 pins the session's sampler.
-visavis_status visavis_session_set_budget(struct visavis_session *session,
-                                          float milliseconds);
+// Sets the milliseconds that a block may take, 1 to 133.3, from the next block on: a governor then
+// chooses the sampler of each block, the session's at best. 0 pins the session's sampler.
+visavis_status visavis_session_set_budget(struct visavis_session *session, float milliseconds);
 
-// Tells the governor how long the last block took by the caller's clock, in place of what the session measured: for callers
-// whose deadline covers more than visavis_session_poll.
-visavis_status visavis_session_report_block_time(struct visavis_session *session,
-                                                 double milliseconds);
+// Tells the governor how long the last block took by the caller's clock, in place of what the
+// session measured: for callers whose deadline covers more than visavis_session_poll.
+visavis_status visavis_session_report_block_time(struct visavis_session *session, double milliseconds);
 
-// Computes the next block if it is due at `now` (session time, seconds, never running backwards). Call it until
-// `*frame_count` is 0: a caller that comes late gets all blocks that it missed.
+// Computes the next block if it is due at `now` (session time, seconds, never running backwards).
+// Call it until `*frame_count` is 0: a caller that comes late gets all blocks that it missed.
 //
-// When a block is due, `*frame_count` becomes 4, and `frames[0..4]` and `joints` are filled; the joints of frame `i` start at
-// `joints[i * visavis_engine_joint_count]`. `frame_size` is sizeof(visavis_frame); `joint_capacity`, in joints, must be
-// at least 4 times the joint count. `joints` may be NULL with capacity 0 if only the frames are wanted. Nothing is allocated.
+// When a block is due, `*frame_count` becomes 4, and `frames[0..4]` and `joints` are filled; the
+// joints of frame `i` start at `joints[i * visavis_engine_joint_count]`. `frame_size` is
+// sizeof(visavis_frame); `joint_capacity`, in joints, must be at least 4 times the joint count.
+// `joints` may be NULL with capacity 0 if only the frames are wanted. Nothing is allocated.
 visavis_status visavis_session_poll(struct visavis_session *session,
                                     double now,
                                     struct visavis_frame *frames,
@@ -431,14 +459,17 @@ visavis_status visavis_session_poll(struct visavis_session *session,
 // Session time at which the next block is due, seconds, into `time`.
 visavis_status visavis_session_next_due(const struct visavis_session *session, double *time);
 
-// Starts anew with the options of now; session time is 0 again. Same inputs, same bits.
+// Starts anew with the options of now; session time is 0 again. Same inputs, same bits. What was
+// pushed before is dropped.
 visavis_status visavis_session_reset(struct visavis_session *session);
 
-// Computes `blocks` blocks for nothing and starts anew, so that memory and CPU are warm when the first block is due.
+// Computes `blocks` blocks for nothing and starts anew, so that memory and CPU are warm when the
+// first block is due.
 visavis_status visavis_session_warm_up(struct visavis_session *session, uint32_t blocks);
 
-// Kernel ids of the threads that the session owns and computes on, for performance hints: `*count` of them, the first `capacity` into
-// `ids`. The thread that polls computes too (visavis_current_thread_id).
+// Kernel ids of the threads that the session owns and computes on, for performance hints: `*count`
+// of them, the first `capacity` into `ids`. The thread that polls computes too
+// (visavis_current_thread_id).
 visavis_status visavis_session_worker_thread_ids(const struct visavis_session *session,
                                                  uint32_t *ids,
                                                  size_t capacity,
@@ -447,7 +478,8 @@ visavis_status visavis_session_worker_thread_ids(const struct visavis_session *s
 // Fills `stats`.
 visavis_status visavis_session_stats(const struct visavis_session *session, struct visavis_stats *stats);
 
-// Text of the last error of the calling thread; empty after a call that succeeded. UTF-8, never NULL.
+// Text of the last error of the calling thread; empty after a call that succeeded. UTF-8, never
+// NULL.
 const char *visavis_last_error(void);
 
 // The kernel's id of the calling thread (gettid), for performance hints; 0 where there is none.

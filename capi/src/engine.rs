@@ -67,8 +67,9 @@ pub unsafe extern "C" fn visavis_engine_from_path(
     unsafe { hand_out(engine, load) }
 }
 
-/// Loads the bundle that lies in an open file, `length` bytes from `offset` on (`length` 0: up to the end), such as an asset
-/// stored uncompressed in an APK. The descriptor's read position is not used or moved. Not on Windows.
+/// Loads the bundle that lies in an open file, `length` bytes from `offset` on (`length` 0: up to
+/// the end), such as an asset stored uncompressed in an APK. The descriptor's read position is not
+/// used or moved. Not on Windows.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_engine_from_fd(
     fd: i32,
@@ -79,19 +80,13 @@ pub unsafe extern "C" fn visavis_engine_from_fd(
     let load = || {
         #[cfg(unix)]
         {
-            use std::os::fd::BorrowedFd;
-            use visavis::{BundleFile, Networks};
             if fd < 0 {
                 return Err(Failure::argument(format!("file descriptor {fd}")));
             }
-            // SAFETY: not -1; an open descriptor for the time of this call, by the ownership chapter. A closed one makes the
-            // duplication fail.
-            let borrowed = unsafe { BorrowedFd::borrow_raw(fd) };
-            let name = format!("file descriptor {fd}");
-            let io = |e| visavis::Error::io("duplicate the descriptor", &name, e);
-            let file = std::fs::File::from(borrowed.try_clone_to_owned().map_err(io)?);
-            let part = BundleFile::open_part(&file, offset, (length > 0).then_some(length), &name)?;
-            Ok(Engine::from_bundle(&part, Networks::default())?)
+            // SAFETY: not -1; an open descriptor for the time of this call, by the ownership
+            // chapter. A closed one makes the duplication fail.
+            let fd = unsafe { std::os::fd::BorrowedFd::borrow_raw(fd) };
+            Ok(Engine::from_fd(fd, offset, (length > 0).then_some(length))?)
         }
         #[cfg(not(unix))]
         {
@@ -153,7 +148,8 @@ pub unsafe extern "C" fn visavis_engine_joint_name(engine: *const VisavisEngine,
     name.map_or(std::ptr::null(), |n| n.as_ptr())
 }
 
-/// Parent of a joint into `parent` (-1: none), and its rest offset from there into `offset[3]`, metres. Either may be NULL.
+/// Parent of a joint into `parent` (-1: none), and its rest offset from there into `offset[3]`,
+/// metres. Either may be NULL.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_engine_joint(
     engine: *const VisavisEngine,
@@ -177,7 +173,8 @@ pub unsafe extern "C" fn visavis_engine_joint(
     })
 }
 
-/// Number in OpenXR's `body` (a visavis_body) of the joint that stands for a joint of this engine; -1 if it has none.
+/// Number in OpenXR's `body` (a visavis_body) of the joint that stands for a joint of this engine;
+/// -1 if it has none.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_engine_openxr_joint(engine: *const VisavisEngine, joint: u32, body: i32) -> i32 {
     // SAFETY: the header's promise.
@@ -188,8 +185,9 @@ pub unsafe extern "C" fn visavis_engine_openxr_joint(engine: *const VisavisEngin
     index.map_or(-1, |i| i as i32)
 }
 
-/// Joint of this engine that OpenXR's body joint `openxr_joint` (below 84) follows: its own, or the nearest one towards the
-/// hips; -1 for the root, which is the agent's place on the floor, and for numbers out of range.
+/// Joint of this engine that OpenXR's body joint `openxr_joint` (below 84) follows: its own, or the
+/// nearest one towards the hips; -1 for the root, which is the agent's place on the floor, and for
+/// numbers out of range.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_engine_joint_for_openxr(engine: *const VisavisEngine, openxr_joint: u32) -> i32 {
     // SAFETY: the header's promise.

@@ -1,6 +1,7 @@
 //! Frames as C sees them.
 
 use crate::options::sampler_numbers;
+use crate::status::{Failure, Outcome, VisavisStatus};
 use visavis::Frame;
 
 /// One frame of motion, without its joints. World coordinates: metres, right-handed, Y up.
@@ -29,13 +30,23 @@ pub struct VisavisFrame {
     pub sampler_steps: u32,
     /// How much of the frame is a held pose instead of the model's, 0 to 1.
     pub held: f32,
+    /// Of test builds.
+    #[cfg(feature = "grown")]
+    pub grown: u64,
 }
+
+/// Size of a frame as it was first published: a literal, so that it stays when the struct grows.
+const FIRST: usize = 72;
+const _: () = assert!(size_of::<VisavisFrame>() >= FIRST);
+// Nothing tells its size, so it cannot grow.
+const _: () = assert!(size_of::<VisavisJoint>() == 44);
 
 /// One joint of a frame. Quaternions are x, y, z, w.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct VisavisJoint {
-    /// Rotation relative to the parent on the rig with fixed bone lengths (hips: relative to the world): for humanoid rigs.
+    /// Rotation relative to the parent on the rig with fixed bone lengths (hips: relative to the
+    /// world): for humanoid rigs.
     pub local: [f32; 4],
     /// Decoded position in the world.
     pub position: [f32; 3],
@@ -58,6 +69,32 @@ impl VisavisFrame {
             sampler_kind,
             sampler_steps,
             held: f.held,
+            #[cfg(feature = "grown")]
+            grown: crate::structs::GROWN,
+        }
+    }
+
+    /// Refuses sizes that no caller's frame has.
+    pub(crate) fn check_size(size: usize) -> Outcome {
+        if (FIRST..=4096).contains(&size) && size.is_multiple_of(align_of::<Self>()) {
+            return Ok(());
+        }
+        let message = format!("frame_size is {size}: pass sizeof(visavis_frame)");
+        Err(Failure::new(VisavisStatus::Abi, message))
+    }
+
+    /// Writes as much of the frame as the caller's struct of `size` bytes holds; bytes beyond are
+    /// zeroed.
+    ///
+    /// # Safety
+    /// `to` has room for `size` bytes.
+    pub(crate) unsafe fn write(&self, to: *mut u8, size: usize) {
+        let known = size.min(size_of::<Self>());
+        // SAFETY: `known` bytes are inside both; what follows, up to `size`, is the caller's
+        // promise.
+        unsafe {
+            to.copy_from_nonoverlapping((&raw const *self).cast::<u8>(), known);
+            to.add(known).write_bytes(0, size - known);
         }
     }
 }

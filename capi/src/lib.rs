@@ -1,8 +1,8 @@
-//! The C interface of Visavis. What a C programmer reads is `include/visavis.h`, generated from this crate; the ownership
-//! chapter at its head (`header.txt`) holds for every function here.
+//! The C interface of Visavis. What a C programmer reads is `include/visavis.h`, generated from
+//! this crate; the ownership chapter at its head (`header.txt`) holds for every function here.
 //!
-//! Each function runs inside [`status::guard`]: null and misaligned pointers, bad values and panics become a status, and the
-//! text of [`visavis_last_error`].
+//! Each function runs inside [`status::guard`]: null and misaligned pointers, bad values and panics
+//! become a status, and the text of [`visavis_last_error`].
 
 mod engine;
 mod frames;
@@ -23,8 +23,8 @@ pub use threads::*;
 
 use std::ffi::c_char;
 
-/// Version of this interface: major number in the upper 16 bits, minor in the lower.
-pub const VISAVIS_ABI_VERSION: u32 = 1 << 16;
+/// Version of this interface, 1.1: major number in the upper 16 bits, minor in the lower.
+pub const VISAVIS_ABI_VERSION: u32 = (1 << 16) | 1;
 
 /// Frames that a poll gives when a block is due.
 pub const VISAVIS_BLOCK_FRAMES: usize = 4;

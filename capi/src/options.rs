@@ -2,7 +2,7 @@
 
 use crate::status::{Failure, Outcome, VisavisStatus, guard};
 use crate::structs::{Sized32, check, sized_struct};
-use visavis::{Budget, Governor, Root, Sampler, SessionOptions};
+use visavis::{Governor, Root, Sampler, SessionOptions};
 
 /// How a block is made: evaluations of the network against quality.
 #[repr(i32)]
@@ -22,17 +22,20 @@ pub enum VisavisSamplerKind {
 pub struct VisavisSessionOptions {
     /// sizeof(visavis_session_options).
     pub struct_size: u32,
-    /// Threads that compute a block, 1 (the caller of visavis_session_poll) or 2; the motion is the same. Default 1.
+    /// Threads that compute a block, 1 (the caller of visavis_session_poll) or 2; the motion is the
+    /// same. Default 1.
     pub threads: u32,
     /// Same seed and same inputs: same motion, bit for bit. Default 0.
     pub seed: u64,
-    /// Cores that the second thread may run on, bit i for core i; 0 (default): any. Linux and Android.
+    /// Cores that the second thread may run on, bit i for core i; 0 (default): any. Linux and
+    /// Android.
     pub core_mask: u64,
     /// A visavis_sampler_kind; default midpoint.
     pub sampler_kind: i32,
     /// Steps of the sampler; default 4.
     pub sampler_steps: u32,
-    /// Gaze target, 0 (averted) to 1 (sustained eye contact), negative to -1; NaN (default): what comes naturally.
+    /// Gaze target, 0 (averted) to 1 (sustained eye contact), negative to -1; NaN (default): what
+    /// comes naturally.
     pub gaze: f32,
     /// Guidance weight, 0 to 20; NaN (default): the bundle's.
     pub guidance: f32,
@@ -40,7 +43,8 @@ pub struct VisavisSessionOptions {
     pub gaze_guidance: f32,
     /// Scale of the noise, 0 to 2; less is calmer. NaN (default): the bundle's.
     pub temperature: f32,
-    /// Where the agent stands at the start: x and z, metres; heading, radians (0 faces +Z, positive turns towards +X).
+    /// Where the agent stands at the start: x and z, metres; heading, radians (0 faces +Z, positive
+    /// turns towards +X).
     pub start_x: f64,
     /// See start_x.
     pub start_z: f64,
@@ -50,14 +54,18 @@ pub struct VisavisSessionOptions {
     pub stance: u32,
     /// Whether frames that no body could show are replaced by a held pose; 1 by default.
     pub guard: u32,
-    /// Milliseconds that a block may take, 1 to 133.3: a governor then chooses the sampler of each block, the session's
-    /// sampler at best, so that none comes late. 0 (default): the session's sampler, always.
+    /// Milliseconds that a block may take, 1 to 133.3: a governor then chooses the sampler of each
+    /// block, the session's sampler at best, so that none comes late. 0 (default): the session's
+    /// sampler, always.
     pub budget_ms: f32,
     /// 0.
     pub reserved: u32,
+    /// Of test builds.
+    #[cfg(feature = "grown")]
+    pub grown: u64,
 }
 
-sized_struct!(VisavisSessionOptions, "visavis_session_options");
+sized_struct!(VisavisSessionOptions, "visavis_session_options", 88);
 
 impl VisavisSessionOptions {
     fn defaults() -> Self {
@@ -79,6 +87,8 @@ impl VisavisSessionOptions {
             guard: 1,
             budget_ms: 0.0,
             reserved: 0,
+            #[cfg(feature = "grown")]
+            grown: crate::structs::GROWN,
         }
     }
 
@@ -90,6 +100,10 @@ impl VisavisSessionOptions {
         let defaults = Self::defaults();
         // SAFETY: the caller's promise.
         let o = if options.is_null() { defaults } else { unsafe { Self::read(options, defaults) }? };
+        #[cfg(feature = "grown")]
+        if o.grown != defaults.grown {
+            return Err(Failure::argument("grown: its default is what an older caller means"));
+        }
         let given = |v: f32| (!v.is_nan()).then_some(v);
         Ok(SessionOptions {
             seed: o.seed,
@@ -103,18 +117,10 @@ impl VisavisSessionOptions {
             start: Root { x: o.start_x, z: o.start_z, yaw: o.start_yaw },
             stance: o.stance != 0,
             guard: o.guard != 0,
-            governor: governor(o.budget_ms),
+            governor: Governor::within(o.budget_ms),
             ..Default::default()
         })
     }
-}
-
-/// No governor for 0, else one with that budget.
-pub(crate) fn governor(budget_ms: f32) -> Governor {
-    if budget_ms == 0.0 {
-        return Governor::Off;
-    }
-    Governor::Budget(Budget { milliseconds: budget_ms, ..Default::default() })
 }
 
 /// The sampler that `kind` and `steps` stand for.

@@ -3,15 +3,16 @@
 use crate::VISAVIS_BLOCK_FRAMES;
 use crate::engine::VisavisEngine;
 use crate::frames::{VisavisFrame, VisavisJoint, joints_of};
-use crate::options::{VisavisSessionOptions, governor, sampler};
+use crate::options::{VisavisSessionOptions, sampler};
 use crate::status::{Failure, Outcome, VisavisStatus, guard};
 use crate::structs::{borrow, place, room, slice};
-use std::sync::{Mutex, TryLockError};
-use visavis::{Session, Voice};
+use std::sync::TryLockError;
+use visavis::glam::Vec3;
+use visavis::{Session, SharedSession, Speaker, VoiceInput};
 
 /// One conversation with one user.
 pub struct VisavisSession {
-    session: Mutex<Session>,
+    shared: SharedSession,
 }
 
 /// One of the two voices.
@@ -24,37 +25,73 @@ pub enum VisavisVoice {
     User = 1,
 }
 
-/// Runs `body` on a session that nobody else is using.
+/// Runs `body` on what goes around a session: inputs and controls, whoever is inside it.
 ///
 /// # Safety
 /// `session`, if neither null nor misaligned, is alive.
-pub(crate) unsafe fn with(session: *const VisavisSession, body: impl FnOnce(&mut Session) -> Outcome) -> VisavisStatus {
+unsafe fn around(session: *const VisavisSession, body: impl FnOnce(&SharedSession) -> Outcome) -> VisavisStatus {
     guard(|| {
         // SAFETY: the caller's promise.
         let session = unsafe { borrow(session, "session") }?;
-        match session.session.try_lock() {
-            Ok(mut session) => body(&mut session),
-            Err(TryLockError::WouldBlock) => Err(Failure::new(
-                VisavisStatus::Busy,
-                "another thread is inside this session: call it from one at a time",
-            )),
-            Err(TryLockError::Poisoned(_)) => Err(Failure::new(
-                VisavisStatus::Panic,
-                "this session met an internal fault before: free it and make another",
-            )),
+        if session.shared.is_poisoned() {
+            return Err(poisoned());
         }
+        body(&session.shared)
     })
 }
 
-fn voice(session: &mut Session, voice: i32) -> Outcome<&mut Voice> {
-    match voice {
-        0 => Ok(session.agent_voice()),
-        1 => Ok(session.user_voice()),
-        _ => Err(Failure::argument(format!("voice {voice}: see visavis_voice"))),
-    }
+/// Runs `body` on a session that nobody else is inside.
+///
+/// # Safety
+/// As [`around`].
+pub(crate) unsafe fn with(session: *const VisavisSession, body: impl FnOnce(&mut Session) -> Outcome) -> VisavisStatus {
+    let inside = |shared: &SharedSession| match shared.try_lock() {
+        Ok(mut session) => body(&mut session),
+        Err(TryLockError::WouldBlock) => {
+            let message = "another thread is inside this session: poll, reset and ask from one at a time";
+            Err(Failure::new(VisavisStatus::Busy, message))
+        }
+        Err(TryLockError::Poisoned(_)) => Err(poisoned()),
+    };
+    // SAFETY: the caller's promise.
+    unsafe { around(session, inside) }
 }
 
-/// Starts a session on `engine`; `options` may be NULL for the defaults. All its memory is taken here.
+fn poisoned() -> Failure {
+    Failure::new(VisavisStatus::Panic, "this session met an internal fault before: free it and make another")
+}
+
+/// Runs `body` on a voice's input.
+///
+/// # Safety
+/// As [`around`].
+unsafe fn voice(session: *const VisavisSession, which: i32, body: impl FnOnce(&VoiceInput)) -> VisavisStatus {
+    let of_voice = |shared: &SharedSession| {
+        body(shared.voice(Speaker::try_from(which)?));
+        Ok(())
+    };
+    // SAFETY: the caller's promise.
+    unsafe { around(session, of_voice) }
+}
+
+/// Appends to a voice.
+///
+/// # Safety
+/// As [`around`]; `samples`, if neither null nor misaligned, are `count`, which nobody writes to
+/// meanwhile.
+unsafe fn push(
+    session: *const VisavisSession,
+    speaker: Speaker,
+    samples: *const f32,
+    count: usize,
+    rate: u32,
+) -> VisavisStatus {
+    // SAFETY: the caller's promise, twice.
+    unsafe { around(session, |shared| Ok(shared.voice(speaker).push(slice(samples, count, "samples")?, rate)?)) }
+}
+
+/// Starts a session on `engine`; `options` may be NULL for the defaults. All its memory is taken
+/// here.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_new(
     engine: *const VisavisEngine,
@@ -68,7 +105,7 @@ pub unsafe extern "C" fn visavis_session_new(
         let engine = unsafe { borrow(engine, "engine") }?;
         // SAFETY: as above.
         let options = unsafe { VisavisSessionOptions::options(options) }?;
-        let made = VisavisSession { session: Mutex::new(engine.engine.session(options)?) };
+        let made = VisavisSession { shared: SharedSession::new(engine.engine.session(options)?) };
         *out = Box::into_raw(Box::new(made));
         Ok(())
     })
@@ -86,9 +123,12 @@ pub unsafe extern "C" fn visavis_session_free(session: *mut VisavisSession) {
     });
 }
 
-/// Appends to the agent's own voice: `count` mono samples, full scale 1, of `rate` Hz (8000 to 192000), up to a minute ahead
-/// of time. More is dropped and counted. Sound that has not come when a block is computed is silence there, is counted, and
-/// is heard later. A voice that was never pushed is absent, which is not the same as silent.
+/// Appends to the agent's own voice: `count` mono samples, full scale 1, of `rate` Hz (8000 to
+/// 192000), up to a minute ahead of time. More is dropped and counted. Sound that has not come when
+/// a block is computed is silence there, is counted, and is heard later. A voice that was never
+/// pushed is absent, which is not the same as silent. Samples that are not finite become silence,
+/// are counted, and make the status VISAVIS_STATUS_AUDIO; all others are taken. From any thread,
+/// see THREADS.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_push_agent_audio(
     session: *mut VisavisSession,
@@ -96,8 +136,8 @@ pub unsafe extern "C" fn visavis_session_push_agent_audio(
     count: usize,
     rate: u32,
 ) -> VisavisStatus {
-    // SAFETY: the header's promise, twice.
-    unsafe { with(session, |s| Ok(s.push_agent_audio(slice(samples, count, "samples")?, rate)?)) }
+    // SAFETY: the header's promise.
+    unsafe { push(session, Speaker::Agent, samples, count, rate) }
 }
 
 /// Appends to the user's voice, as visavis_session_push_agent_audio.
@@ -108,49 +148,41 @@ pub unsafe extern "C" fn visavis_session_push_user_audio(
     count: usize,
     rate: u32,
 ) -> VisavisStatus {
-    // SAFETY: the header's promise, twice.
-    unsafe { with(session, |s| Ok(s.push_user_audio(slice(samples, count, "samples")?, rate)?)) }
+    // SAFETY: the header's promise.
+    unsafe { push(session, Speaker::User, samples, count, rate) }
 }
 
-/// Ends an utterance of a voice (a visavis_voice): the last milliseconds, which wait in the resampler, come out. Optional.
+/// Ends an utterance of a voice (a visavis_voice): the last milliseconds, which wait in the
+/// resampler, come out. Optional.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_finish_audio(session: *mut VisavisSession, which: i32) -> VisavisStatus {
-    let finish = |s: &mut Session| {
-        voice(s, which)?.finish();
-        Ok(())
-    };
     // SAFETY: the header's promise.
-    unsafe { with(session, finish) }
+    unsafe { voice(session, which, VoiceInput::finish) }
 }
 
-/// Drops all sound of a voice (a visavis_voice) that has not been used, as when an utterance is broken off.
+/// Drops all sound of a voice (a visavis_voice) that has not been used, as when an utterance is
+/// broken off.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_clear_audio(session: *mut VisavisSession, which: i32) -> VisavisStatus {
-    let clear = |s: &mut Session| {
-        voice(s, which)?.clear();
-        Ok(())
-    };
     // SAFETY: the header's promise.
-    unsafe { with(session, clear) }
+    unsafe { voice(session, which, VoiceInput::clear) }
 }
 
-/// Makes a voice (a visavis_voice) present, silent until something is pushed (`present` not 0), or absent until the next push (0).
+/// Makes a voice (a visavis_voice) present, silent until something is pushed (`present` not 0), or
+/// absent until the next push (0).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_set_audio_present(
     session: *mut VisavisSession,
     which: i32,
     present: i32,
 ) -> VisavisStatus {
-    let set = |s: &mut Session| {
-        voice(s, which)?.set_present(present != 0);
-        Ok(())
-    };
     // SAFETY: the header's promise.
-    unsafe { with(session, set) }
+    unsafe { voice(session, which, |voice| voice.set_present(present != 0)) }
 }
 
-/// Tells where the user's head is (midpoint of the eyes), world metres, at `time` seconds of session time. Any rate; positions
-/// that are not finite, out of order or impossible are ignored and counted (visavis_stats).
+/// Tells where the user's head is (midpoint of the eyes), world metres, at `time` seconds of
+/// session time. Any rate; positions are put in order by time. Those that are late, not finite or
+/// impossible are ignored and counted (visavis_stats). From any thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_push_user_head(
     session: *mut VisavisSession,
@@ -159,25 +191,30 @@ pub unsafe extern "C" fn visavis_session_push_user_head(
     z: f32,
     time: f64,
 ) -> VisavisStatus {
+    let tell = |shared: &SharedSession| {
+        shared.head().push(Vec3::new(x, y, z), time);
+        Ok(())
+    };
     // SAFETY: the header's promise.
-    unsafe { with(session, |s| Ok(s.push_user_head(glam::Vec3::new(x, y, z), time)?)) }
+    unsafe { around(session, tell) }
 }
 
 /// Sets the gaze target from the next block on: 0 averted, 1 sustained eye contact.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_set_gaze(session: *mut VisavisSession, target: f32) -> VisavisStatus {
     // SAFETY: the header's promise.
-    unsafe { with(session, |s| Ok(s.set_gaze(Some(target))?)) }
+    unsafe { around(session, |s| Ok(s.controls().set_gaze(Some(target))?)) }
 }
 
 /// Leaves the gaze to the model from the next block on.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_set_natural_gaze(session: *mut VisavisSession) -> VisavisStatus {
     // SAFETY: the header's promise.
-    unsafe { with(session, |s| Ok(s.set_gaze(None)?)) }
+    unsafe { around(session, |s| Ok(s.controls().set_gaze(None)?)) }
 }
 
-/// Sets the guidance weights, 0 to 20: of the conditioning as a whole (1 is none), and of the gaze target.
+/// Sets the guidance weights, 0 to 20: of the conditioning as a whole (1 is none), and of the gaze
+/// target.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_set_guidance(
     session: *mut VisavisSession,
@@ -185,7 +222,7 @@ pub unsafe extern "C" fn visavis_session_set_guidance(
     gaze: f32,
 ) -> VisavisStatus {
     // SAFETY: the header's promise.
-    unsafe { with(session, |s| Ok(s.set_guidance(weight, gaze)?)) }
+    unsafe { around(session, |s| Ok(s.controls().set_guidance(weight, gaze)?)) }
 }
 
 /// Sets the sampler from the next block on; `kind` is a visavis_sampler_kind.
@@ -196,34 +233,35 @@ pub unsafe extern "C" fn visavis_session_set_sampler(
     steps: u32,
 ) -> VisavisStatus {
     // SAFETY: the header's promise.
-    unsafe { with(session, |s| Ok(s.set_sampler(sampler(kind, steps)?)?)) }
+    unsafe { around(session, |s| Ok(s.controls().set_sampler(sampler(kind, steps)?)?)) }
 }
 
-/// Sets the milliseconds that a block may take, 1 to 133.3, from the next block on: a governor then chooses the sampler of
-/// each block, the session's at best. 0 pins the session's sampler.
+/// Sets the milliseconds that a block may take, 1 to 133.3, from the next block on: a governor then
+/// chooses the sampler of each block, the session's at best. 0 pins the session's sampler.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_set_budget(session: *mut VisavisSession, milliseconds: f32) -> VisavisStatus {
     // SAFETY: the header's promise.
-    unsafe { with(session, |s| Ok(s.set_governor(governor(milliseconds))?)) }
+    unsafe { around(session, |s| Ok(s.controls().set_budget(milliseconds)?)) }
 }
 
-/// Tells the governor how long the last block took by the caller's clock, in place of what the session measured: for callers
-/// whose deadline covers more than visavis_session_poll.
+/// Tells the governor how long the last block took by the caller's clock, in place of what the
+/// session measured: for callers whose deadline covers more than visavis_session_poll.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_report_block_time(
     session: *mut VisavisSession,
     milliseconds: f64,
 ) -> VisavisStatus {
     // SAFETY: the header's promise.
-    unsafe { with(session, |s| Ok(s.report_block_time(milliseconds)?)) }
+    unsafe { around(session, |s| Ok(s.controls().report_block_time(milliseconds)?)) }
 }
 
-/// Computes the next block if it is due at `now` (session time, seconds, never running backwards). Call it until
-/// `*frame_count` is 0: a caller that comes late gets all blocks that it missed.
+/// Computes the next block if it is due at `now` (session time, seconds, never running backwards).
+/// Call it until `*frame_count` is 0: a caller that comes late gets all blocks that it missed.
 ///
-/// When a block is due, `*frame_count` becomes 4, and `frames[0..4]` and `joints` are filled; the joints of frame `i` start at
-/// `joints[i * visavis_engine_joint_count]`. `frame_size` is sizeof(visavis_frame); `joint_capacity`, in joints, must be
-/// at least 4 times the joint count. `joints` may be NULL with capacity 0 if only the frames are wanted. Nothing is allocated.
+/// When a block is due, `*frame_count` becomes 4, and `frames[0..4]` and `joints` are filled; the
+/// joints of frame `i` start at `joints[i * visavis_engine_joint_count]`. `frame_size` is
+/// sizeof(visavis_frame); `joint_capacity`, in joints, must be at least 4 times the joint count.
+/// `joints` may be NULL with capacity 0 if only the frames are wanted. Nothing is allocated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_poll(
     session: *mut VisavisSession,
@@ -242,26 +280,15 @@ pub unsafe extern "C" fn visavis_session_poll(
         if joint_capacity < all && !(joints.is_null() && joint_capacity == 0) {
             return Err(Failure::argument(format!("joint_capacity is {joint_capacity}: a block has {all} joints")));
         }
-        if frame_size < size_of::<VisavisFrame>()
-            || frame_size > 4096
-            || !frame_size.is_multiple_of(align_of::<VisavisFrame>())
-        {
-            let message = format!("frame_size is {frame_size}: pass sizeof(visavis_frame)");
-            return Err(Failure::new(VisavisStatus::Abi, message));
-        }
+        VisavisFrame::check_size(frame_size)?;
         crate::structs::check(frames, "frames")?;
         // SAFETY: the header's promise.
         let room_for_joints = unsafe { room(joints, if joints.is_null() { 0 } else { all }, "joints") }?;
         let Some(made) = s.poll(now)? else { return Ok(()) };
         let mut joints_left = room_for_joints.iter_mut();
         for (i, frame) in made.iter().enumerate() {
-            // SAFETY: the header's promise: four frames of `frame_size` bytes, which keeps the alignment; bytes beyond
-            // what this library knows are zeroed.
-            unsafe {
-                let at = frames.cast::<u8>().add(i * frame_size);
-                at.cast::<VisavisFrame>().write(VisavisFrame::of(frame));
-                at.add(size_of::<VisavisFrame>()).write_bytes(0, frame_size - size_of::<VisavisFrame>());
-            }
+            // SAFETY: the header's promise: four frames of `frame_size` bytes.
+            unsafe { VisavisFrame::of(frame).write(frames.cast::<u8>().add(i * frame_size), frame_size) };
             joints_of(frame).zip(joints_left.by_ref()).for_each(|(joint, to)| _ = to.write(joint));
         }
         *count = made.len() as u32;
@@ -283,22 +310,25 @@ pub unsafe extern "C" fn visavis_session_next_due(session: *const VisavisSession
     unsafe { with(session, due) }
 }
 
-/// Starts anew with the options of now; session time is 0 again. Same inputs, same bits.
+/// Starts anew with the options of now; session time is 0 again. Same inputs, same bits. What was
+/// pushed before is dropped.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_reset(session: *mut VisavisSession) -> VisavisStatus {
     // SAFETY: the header's promise.
     unsafe { with(session, |s| Ok(s.reset()?)) }
 }
 
-/// Computes `blocks` blocks for nothing and starts anew, so that memory and CPU are warm when the first block is due.
+/// Computes `blocks` blocks for nothing and starts anew, so that memory and CPU are warm when the
+/// first block is due.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_warm_up(session: *mut VisavisSession, blocks: u32) -> VisavisStatus {
     // SAFETY: the header's promise.
     unsafe { with(session, |s| Ok(s.warm_up(blocks)?)) }
 }
 
-/// Kernel ids of the threads that the session owns and computes on, for performance hints: `*count` of them, the first `capacity` into
-/// `ids`. The thread that polls computes too (visavis_current_thread_id).
+/// Kernel ids of the threads that the session owns and computes on, for performance hints: `*count`
+/// of them, the first `capacity` into `ids`. The thread that polls computes too
+/// (visavis_current_thread_id).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_worker_thread_ids(
     session: *const VisavisSession,

@@ -35,7 +35,8 @@ pub struct VisavisStats {
     pub block_ms_p99: f64,
     /// Maximum.
     pub block_ms_max: f64,
-    /// From something that the user does to the start of the first block that can answer, at most, milliseconds.
+    /// From something that the user does to the start of the first block that can answer, at most,
+    /// milliseconds.
     pub user_delay_ms: f64,
     /// The same for the agent's own voice; 0 when it is known ahead.
     pub agent_delay_ms: f64,
@@ -51,7 +52,7 @@ pub struct VisavisStats {
     pub head_accepted: u64,
     /// Ignored: not finite.
     pub head_non_finite: u64,
-    /// Ignored: not later than the one before.
+    /// Ignored: late (a block has used one of that time or later), or at the time of another.
     pub head_out_of_order: u64,
     /// Ignored: more than 1 km from the origin, or a time of more than 10 million seconds.
     pub head_absurd: u64,
@@ -73,9 +74,27 @@ pub struct VisavisStats {
     pub guard_trips: u64,
     /// Frames that it held, or faded back.
     pub guard_held_frames: u64,
+    /// Since interface 1.1. The agent's voice, input samples: not finite, which silence replaced.
+    pub agent_non_finite_samples: u64,
+    /// Pushed at a rate out of range and not taken.
+    pub agent_bad_rate_samples: u64,
+    /// Dropped because another thread was inside this voice's input and lost its core there for
+    /// long.
+    pub agent_contended_samples: u64,
+    /// The same for the user's voice.
+    pub user_non_finite_samples: u64,
+    /// See agent_bad_rate_samples.
+    pub user_bad_rate_samples: u64,
+    /// See agent_contended_samples.
+    pub user_contended_samples: u64,
+    /// Of test builds.
+    #[cfg(feature = "grown")]
+    pub grown: u64,
 }
 
-sized_struct!(VisavisStats, "visavis_stats");
+sized_struct!(VisavisStats, "visavis_stats", 232);
+// A part of the statistics, and so of this size for ever.
+const _: () = assert!(size_of::<VisavisVoiceStats>() == 24);
 
 impl From<VoiceStats> for VisavisVoiceStats {
     fn from(v: VoiceStats) -> Self {
@@ -117,6 +136,14 @@ impl From<SessionStats> for VisavisStats {
             governor_catch_up_passes: s.governor.catch_up_passes,
             guard_trips: s.guard.trips,
             guard_held_frames: s.guard.held_frames,
+            agent_non_finite_samples: s.inputs.agent_voice.non_finite_samples,
+            agent_bad_rate_samples: s.inputs.agent_voice.bad_rate_samples,
+            agent_contended_samples: s.inputs.agent_voice.contended_samples,
+            user_non_finite_samples: s.inputs.user_voice.non_finite_samples,
+            user_bad_rate_samples: s.inputs.user_voice.bad_rate_samples,
+            user_contended_samples: s.inputs.user_voice.contended_samples,
+            #[cfg(feature = "grown")]
+            grown: crate::structs::GROWN,
         }
     }
 }

@@ -22,13 +22,14 @@ pub enum VisavisStatus {
     BundleVersion = 4,
     /// The bundle's config and tensors disagree.
     BundleInvalid = 5,
-    /// Audio of a bad rate, or samples that are not finite; nothing of the push was taken.
+    /// Audio of a bad rate, of which nothing was taken, or samples that are not finite, in whose
+    /// place there is silence.
     Audio = 6,
     /// The call does not fit the session's state, for example time that runs backwards.
     State = 7,
     /// VISAVIS_CPU asks for a level that this CPU does not have.
     CpuLevel = 8,
-    /// Another thread is inside this session.
+    /// Another thread is inside this session. Pushes and settings never meet this.
     Busy = 9,
     /// Program and library do not fit together.
     Abi = 10,
@@ -74,14 +75,16 @@ impl From<Error> for Failure {
 }
 
 thread_local! {
-    static LAST: RefCell<CString> = RefCell::default();
+    /// `None` after a call that succeeded: such calls do not allocate.
+    static LAST: RefCell<Option<CString>> = const { RefCell::new(None) };
 }
 
-/// Text of the last error of the calling thread; empty after a call that succeeded. UTF-8, never NULL.
+/// Text of the last error of the calling thread; empty after a call that succeeded. UTF-8, never
+/// NULL.
 #[unsafe(no_mangle)]
 pub extern "C" fn visavis_last_error() -> *const c_char {
     // A thread that is ending has no text any more.
-    LAST.try_with(|last| last.borrow().as_ptr()).unwrap_or(c"".as_ptr())
+    LAST.try_with(|last| last.borrow().as_ref().map(|text| text.as_ptr())).ok().flatten().unwrap_or(c"".as_ptr())
 }
 
 /// Runs the body of an exported function and makes a status of what comes out.
@@ -89,8 +92,8 @@ pub(crate) fn guard(body: impl FnOnce() -> Outcome) -> VisavisStatus {
     let outcome = catch_unwind(AssertUnwindSafe(body))
         .unwrap_or_else(|payload| Err(Failure::new(VisavisStatus::Panic, panic_text(payload.as_ref()))));
     let (status, text) = match outcome {
-        Ok(()) => (VisavisStatus::Ok, CString::default()),
-        Err(failure) => (failure.status, CString::new(failure.message.replace('\0', "?")).unwrap_or_default()),
+        Ok(()) => (VisavisStatus::Ok, None),
+        Err(failure) => (failure.status, CString::new(failure.message.replace('\0', "?")).ok()),
     };
     let _ = LAST.try_with(|last| last.replace(text));
     status

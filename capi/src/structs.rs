@@ -68,18 +68,21 @@ fn check_count<T>(count: usize, name: &str) -> Outcome {
     Ok(())
 }
 
-/// A struct of plain numbers, valid with any bits, whose first field says how large the caller believes it to be.
+/// A struct of plain numbers, valid with any bits, whose first field says how large the caller
+/// believes it to be.
 ///
 /// # Safety
 /// `#[repr(C)]`, every bit pattern valid, no padding, `struct_size: u32` first.
 pub(crate) unsafe trait Sized32: Copy {
-    /// Size of the first version of the struct.
+    /// Size of the struct as it was first published: a literal, so that it stays when the struct
+    /// grows.
     const FIRST: usize;
     /// Its name in C.
     const NAME: &'static str;
 
-    /// Reads what the caller filled in over `defaults`: an older caller's shorter struct leaves the rest as it is. A newer caller's longer
-    /// one is taken if what this library does not know is zero.
+    /// Reads what the caller filled in over `defaults`: an older caller's shorter struct leaves the
+    /// rest as it is. A newer caller's longer one is taken if what this library does not know is
+    /// zero.
     ///
     /// # Safety
     /// A non-null `pointer` points to as many bytes as its first field says.
@@ -99,7 +102,8 @@ pub(crate) unsafe trait Sized32: Copy {
         Ok(value)
     }
 
-    /// Writes as much of `value` as the caller's struct holds, but for `struct_size`, which stays; bytes beyond are zeroed.
+    /// Writes as much of `value` as the caller's struct holds, but for `struct_size`, which stays;
+    /// bytes beyond are zeroed.
     ///
     /// # Safety
     /// As [`Sized32::read`], for writing.
@@ -133,15 +137,20 @@ pub(crate) unsafe trait Sized32: Copy {
     }
 }
 
-/// Makes sure that `struct_size` is where [`Sized32`] expects it.
+/// Makes sure that `struct_size` is where [`Sized32`] expects it, and that the struct has only
+/// grown since it was `$first` bytes.
 macro_rules! sized_struct {
-    ($type:ident, $name:literal) => {
-        const _: () = assert!(std::mem::offset_of!($type, struct_size) == 0);
+    ($type:ident, $name:literal, $first:literal) => {
+        const _: () = assert!(std::mem::offset_of!($type, struct_size) == 0 && size_of::<$type>() >= $first);
         // SAFETY: repr(C), numbers only, padding spelled out (asserted by a test of the layouts).
         unsafe impl crate::structs::Sized32 for $type {
-            const FIRST: usize = std::mem::size_of::<$type>();
+            const FIRST: usize = $first;
             const NAME: &'static str = $name;
         }
     };
 }
 pub(crate) use sized_struct;
+
+/// What the fields hold that the feature `grown` adds.
+#[cfg(feature = "grown")]
+pub(crate) const GROWN: u64 = 0x6772_6f77_6e21;

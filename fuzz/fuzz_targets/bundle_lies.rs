@@ -1,5 +1,5 @@
-//! Bundles that lie: a sound safetensors header whose shapes, offsets, types and sizes contradict each other or the data, or a
-//! sound container whose config or weights are wrong.
+//! Bundles that lie: a sound safetensors header whose shapes, offsets, types and sizes contradict
+//! each other or the data, or a sound container whose config or weights are wrong.
 #![no_main]
 
 use arbitrary::{Arbitrary, Unstructured};
@@ -46,7 +46,8 @@ fuzz_target!(|data: &[u8]| {
     let Ok(lies) = Vec::<Lie>::arbitrary(&mut u) else { return };
     let bytes = tell(&lies[..lies.len().min(4)]);
     let Ok(engine) = Engine::from_slice(&bytes, "fuzz") else { return };
-    // One evaluation of one of the two networks, for every other input: most lies are found out before, and loading is what they are for.
+    // One evaluation of one of the two networks, for every other input: most lies are found out
+    // before, and loading is what they are for.
     let sampler = match data.len() % 4 {
         0 => Sampler::Single,
         1 => Sampler::euler(1).expect("one step"),

@@ -1,6 +1,7 @@
-//! The C interface under a caller that does anything: any order of calls, null and misaligned pointers, sizes that lie, numbers out of
-//! range. A status comes back, never a panic, and not a byte beyond what the caller offered is written. Pointers that are neither null
-//! nor misaligned are sound, as the ownership chapter of the header asks.
+//! The C interface under a caller that does anything: any order of calls, null and misaligned
+//! pointers, sizes that lie, numbers out of range. A status comes back, never a panic, and not a
+//! byte beyond what the caller offered is written. Pointers that are neither null nor misaligned
+//! are sound, as the ownership chapter of the header asks.
 #![no_main]
 
 use arbitrary::{Arbitrary, Unstructured};

@@ -1,5 +1,5 @@
-//! A caller that does anything in any order: sizes, rates, NaN, time that goes back, options that change. Frames are finite and
-//! in order, errors are typed, nothing else happens.
+//! A caller that does anything in any order: sizes, rates, NaN, time that goes back, options that
+//! change. Frames are finite and in order, errors are typed, nothing else happens.
 #![no_main]
 
 use arbitrary::{Arbitrary, Unstructured};
@@ -7,12 +7,13 @@ use glam::Vec3;
 use libfuzzer_sys::fuzz_target;
 use std::cell::RefCell;
 use visavis::internals::session::{Anchoring, Diagnostics};
-use visavis::{Budget, ErrorKind, Governor, Root, Sampler, Session, SessionOptions};
+use visavis::{Budget, ErrorKind, Governor, Root, Sampler, Session, SessionOptions, Speaker};
 use visavis_fuzz::{engine, student};
 
 thread_local! {
-    /// The session of most executions, of an engine with the student alone: making one takes longer than using it, and a reset is to
-    /// leave nothing behind. One execution in eight makes its own, with both networks.
+    /// The session of most executions, of an engine with the student alone: making one takes longer
+    /// than using it, and a reset is to leave nothing behind. One execution in eight makes its own,
+    /// with both networks.
     static KEPT: RefCell<Option<Session>> = const { RefCell::new(None) };
 }
 
@@ -50,6 +51,9 @@ enum Step {
     Time(f64),
     Present(bool, bool),
     Finish(bool),
+    Clear(bool),
+    /// Settings by the way of other threads.
+    Elsewhere(Option<f32>, f32, u8),
     Replay,
     Reset,
 }
@@ -128,9 +132,8 @@ fn take(session: &mut Session, step: Step, next: &mut Option<u64>) -> u32 {
             assert!(matches!(e.kind(), ErrorKind::Argument | ErrorKind::Audio), "{e}");
         }
     };
-    let push = |session: &mut Session, agent, samples: &[f32], rate| {
-        if agent { session.push_agent_audio(samples, rate) } else { session.push_user_audio(samples, rate) }
-    };
+    let speaker = |agent| if agent { Speaker::Agent } else { Speaker::User };
+    let push = |session: &mut Session, agent, samples: &[f32], rate| session.push_audio(speaker(agent), samples, rate);
     match step {
         Step::Sound(agent, len, rate, value) => {
             sound.fill(value);
@@ -155,9 +158,18 @@ fn take(session: &mut Session, step: Step, next: &mut Option<u64>) -> u32 {
         Step::Governor(budget) => typed(session.set_governor(governor(budget))),
         Step::Time(ms) => typed(session.report_block_time(ms)),
         Step::Present(agent, present) => {
-            if agent { session.agent_voice() } else { session.user_voice() }.set_present(present);
+            session.voice_input(speaker(agent)).set_present(present);
         }
-        Step::Finish(agent) => if agent { session.agent_voice() } else { session.user_voice() }.finish(),
+        Step::Finish(agent) => session.voice_input(speaker(agent)).finish(),
+        Step::Clear(agent) => session.voice_input(speaker(agent)).clear(),
+        Step::Elsewhere(gaze, budget, i) => {
+            let controls = session.controls();
+            typed(controls.set_gaze(gaze));
+            typed(controls.set_guidance(budget, gaze.unwrap_or(1.0)));
+            typed(controls.set_sampler(sampler(i)));
+            typed(controls.set_budget(budget));
+            typed(controls.report_block_time(f64::from(budget)));
+        }
         Step::Replay => {
             let decisions: Vec<_> = session.decisions().collect();
             typed(session.set_governor(Governor::Replay(decisions.into())));

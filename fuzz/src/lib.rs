@@ -55,7 +55,8 @@ const JOINTS: [&str; 10] = [
     "rightFoot",
 ];
 
-/// A bundle that costs little: the tiny one with ten joints, one layer a network, windows of two blocks and an idle clip of one.
+/// A bundle that costs little: the tiny one with ten joints, one layer a network, windows of two
+/// blocks and an idle clip of one.
 pub fn small() -> &'static Parts {
     static PARTS: OnceLock<Parts> = OnceLock::new();
     PARTS.get_or_init(make_small)
@@ -111,7 +112,8 @@ fn make_small() -> Parts {
     parts
 }
 
-/// Leaves [`JOINTS`], and of everything that is as wide as the features so much as they need: the weights are random anyway.
+/// Leaves [`JOINTS`], and of everything that is as wide as the features so much as they need: the
+/// weights are random anyway.
 fn fewer_joints(parts: &mut Parts) {
     let joints = parts.config["rig"]["joints"].as_array_mut().expect("joints");
     let wide = feature_count(joints.len());

@@ -1,9 +1,11 @@
-//! The audio encoder on our own kernels: a stack of causal strided convolutions, one feature vector a frame.
+//! The audio encoder on our own kernels: a stack of causal strided convolutions, one feature vector
+//! per frame.
 //!
-//! Signals are time-major rows of channels, so a window of `kernel` rows is `kernel * inputs` contiguous floats, and a
-//! convolution over `n` outputs is a product of `n` such windows with `[outputs, kernel * inputs]`. A layer keeps the last
-//! `kernel - stride` rows of its input: the left context of the next call, zeros at the start. Every output
-//! row is computed from the same numbers in the same order however the signal is cut, so any cutting gives the same bits.
+//! Signals are time-major rows of channels, so a window of `kernel` rows is `kernel * inputs`
+//! contiguous floats, and a convolution over `n` outputs is a product of `n` such windows with
+//! `[outputs, kernel * inputs]`. A layer keeps the last `kernel - stride` rows of its input: the
+//! left context of the next call, zeros at the start. Every output row is computed from the same
+//! numbers in the same order however the signal is cut, so any cutting gives the same bits.
 
 use super::weights::AudioWeights;
 use crate::config::{AudioConfig, ConvConfig};
@@ -33,7 +35,8 @@ impl Input {
     }
 }
 
-/// The encoder's state for one voice: left contexts and scratch. Allocates when made and never after.
+/// The encoder's state for one voice: left contexts and scratch. Allocates when made and never
+/// after.
 pub struct AudioEncoder {
     inputs: Vec<Input>,
     /// Input of the output layer, 4 frames.
@@ -74,8 +77,9 @@ impl AudioEncoder {
         }
     }
 
-    /// Encodes `samples` (24 kHz mono, a multiple of 800), which follow those of the call before, into one feature vector
-    /// a frame: `out` is row-major `[samples.len() / 800, features]`. Vector `t` depends on samples before `800 (t + 1)` only.
+    /// Encodes `samples` (24 kHz mono, a multiple of 800), which follow those of the call before,
+    /// into one feature vector a frame: `out` is row-major `[samples.len() / 800, features]`.
+    /// Vector `t` depends on samples before `800 (t + 1)` only.
     ///
     /// # Panics
     /// When lengths disagree, or the weights are of another configuration.

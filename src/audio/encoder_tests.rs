@@ -12,7 +12,8 @@ fn config(layers: &[(usize, usize, usize, usize, bool)], features: usize) -> Aud
     AudioConfig { layers: layers.iter().map(conv).collect(), features }
 }
 
-/// Overlapping and adjoining windows, a kernel of three strides, a residual layer of kernel 1, odd sizes.
+/// Overlapping and adjoining windows, a kernel of three strides, a residual layer of kernel 1, odd
+/// sizes.
 fn small() -> AudioConfig {
     config(
         &[
@@ -44,7 +45,8 @@ fn base() -> AudioConfig {
     )
 }
 
-/// Weights of a size that keeps signals at about 1: `[rows, cols]` and `[rows]` for each layer, the last for the output.
+/// Weights of a size that keeps signals at about 1: `[rows, cols]` and `[rows]` for each layer, the
+/// last for the output.
 struct Net(AudioConfig, Vec<(usize, usize, Vec<f32>, Vec<f32>)>);
 
 impl Net {

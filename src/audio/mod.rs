@@ -1,25 +1,30 @@
 //! Voices: from pushed samples to one feature vector per frame.
 //!
 //! ```text
-//! push: f32 ──> Voice (Resampler, ring on the session's time line) ──> AudioEncoder ──> D_a features per frame
-//!               any rate and size in, 3200 samples per block out       on our kernels, or TractEncoder
+//! push: f32 ──> VoiceInput ───────────> Voice ─────────────────> AudioEncoder ──> features
+//! any size,     resampler; a ring of    3200 samples per block,  on our kernels,  D_a per
+//! rate, thread  a minute at 24 kHz      on the session's time    or TractEncoder  frame
 //! ```
 
 mod encoder;
+mod feed;
+mod input;
+mod line;
 mod resample;
-mod ring;
 #[cfg(feature = "tract")]
 mod tract;
 mod voice;
 mod weights;
 
 pub use encoder::AudioEncoder;
+pub use input::{Speaker, VoiceInput};
+pub use line::VoiceStats;
 #[cfg(feature = "internals")]
 pub use resample::resample_to_24k;
 pub use resample::{MAX_RATE, MIN_RATE, Resampler, check_rate};
 #[cfg(feature = "tract")]
 pub use tract::TractEncoder;
-pub use voice::{VOICE_SECONDS, Voice, VoiceStats};
+pub use voice::{VOICE_SECONDS, Voice};
 pub use weights::{AudioWeights, LayerWeights, check_audio_config};
 
 /// What computes the audio encoder.
@@ -29,7 +34,8 @@ pub enum AudioBackend {
     /// Our kernels, [`AudioEncoder`]: no allocation in a block, the same bits on every CPU.
     #[default]
     Kernels,
-    /// tract-core, [`TractEncoder`]: allocates in every block; equals the kernels within 1e-5 for float weights.
+    /// tract-core, [`TractEncoder`]: allocates in every block; equals the kernels within 1e-5 for
+    /// float weights.
     #[cfg(feature = "tract")]
     Tract,
 }

@@ -1,17 +1,19 @@
 //! Streaming conversion of any sample rate to 24 kHz: windowed-sinc interpolation by rubato.
 //!
-//! A sample between input samples is a weighted sum of its neighbours on both sides, so output `n`, which stands for the
-//! input at time `n / 24000` s, needs input that comes up to [`Resampler::latency`] later. Input goes to rubato in
-//! pieces whose length depends on the position in the stream alone, never on how the caller cut it: any chunking gives
-//! the same bits.
+//! A sample between input samples is a weighted sum of its neighbours on both sides, so output `n`,
+//! which stands for the input at time `n / 24000` s, needs input that comes up to
+//! [`Resampler::latency`] later. Input goes to rubato in pieces whose length depends on the
+//! position in the stream alone, never on how the caller cut it: any chunking gives the same bits.
 //!
-//! rubato starts at a fraction of an output sample. With `L` filter taps, `f` stored phases and `t = rate / 24000` input
-//! samples an output sample, its first output is centred on input `-L/2 + 1/f + t_0`, where `t_0` is its first step. The
-//! first step is chosen so that this is `-m t` for a whole `m`: dropping `m` outputs leaves one exactly at input 0.
+//! rubato starts at a fraction of an output sample. With `L` filter taps, `f` stored phases and `t
+//! = rate / 24000` input samples per output sample, its first output is centred on input `-L/2 +
+//! 1/f + t_0`, where `t_0` is its first step. The first step is chosen so that this is `-m t` for a
+//! whole `m`: dropping `m` outputs leaves one exactly at input 0.
 //!
-//! rubato sums in an order that depends on the CPU, and its filter on the platform's sine. So it runs in f64 and what comes
-//! out is rounded to multiples of 2^-20 (-120 dB): the same bits everywhere, but for a sample in some 10^9 that falls within
-//! an f64 error of the middle between two.
+//! rubato sums in an order that depends on the CPU, and its filter on the platform's sine. So it
+//! runs in f64 and what comes out is rounded to multiples of 2^-20 (-120 dB): the same bits
+//! everywhere, but for a sample in some 10^9 that falls within an f64 error of the middle between
+//! two.
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::SAMPLE_RATE;
@@ -71,13 +73,15 @@ impl Resampler {
         self.rate
     }
 
-    /// Most output samples (24 kHz) by which what came out can lag what was pushed: after `i` input samples at least
-    /// `floor(i * 24000 / rate) - latency_samples()` have come out. 0 at 24 kHz, else 41 or 42 from 22.9 kHz up, 58 at 16 kHz, 107 at 8 kHz.
+    /// Most output samples (24 kHz) by which what came out can lag what was pushed: after `i` input
+    /// samples at least `floor(i * 24000 / rate) - latency_samples()` have come out. 0 at 24 kHz,
+    /// else 41 or 42 from 22.9 kHz up, 58 at 16 kHz, 107 at 8 kHz.
     pub fn latency_samples(&self) -> usize {
         self.sinc.as_ref().map_or(0, |s| s.latency)
     }
 
-    /// Converts `input` and hands what is ready to `out`, in order, in pieces. `input` must be finite.
+    /// Converts `input` and hands what is ready to `out`, in order, in pieces. `input` must be
+    /// finite.
     pub fn push(&mut self, input: &[f32], mut out: impl FnMut(&[f32])) {
         match &mut self.sinc {
             None => out(input),
@@ -85,8 +89,9 @@ impl Resampler {
         }
     }
 
-    /// Ends the stream: hands out what is still inside, as if silence followed, so that `ceil(i * 24000 / rate)` samples
-    /// have come out for `i` that went in. The next push starts a new stream.
+    /// Ends the stream: hands out what is still inside, as if silence followed, so that `ceil(i *
+    /// 24000 / rate)` samples have come out for `i` that went in. The next push starts a new
+    /// stream.
     pub fn finish(&mut self, mut out: impl FnMut(&[f32])) {
         if let Some(sinc) = &mut self.sinc {
             sinc.finish(&mut out);
@@ -101,8 +106,8 @@ impl Resampler {
     }
 }
 
-/// The whole of `samples` (mono, `rate` Hz, finite) at 24 kHz: `ceil(len * 24000 / rate)` samples, sample `n` at time
-/// `n / 24000` s.
+/// The whole of `samples` (mono, `rate` Hz, finite) at 24 kHz: `ceil(len * 24000 / rate)` samples,
+/// sample `n` at time `n / 24000` s.
 ///
 /// # Errors
 /// [`ErrorKind::Audio`] for a rate outside 8 to 192 kHz.

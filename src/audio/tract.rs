@@ -1,8 +1,9 @@
 //! The audio encoder on tract-core: the same network, built from tract's own operators.
 //!
-//! Each convolution's left context is an input and an output of the model, so a run is a pure function of samples and
-//! state. tract allocates whenever it runs, so sessions use [`super::AudioEncoder`] by default; this one is the
-//! independent answer that ours is tested against, and an alternative where allocation does not matter.
+//! Each convolution's left context is an input and an output of the model, so a run is a pure
+//! function of samples and state. tract allocates whenever it runs, so sessions use
+//! [`super::AudioEncoder`] by default; this one is the independent answer that ours is tested
+//! against, and an alternative where allocation does not matter.
 
 use super::weights::{LayerWeights, check_weights};
 use crate::config::{AudioConfig, ConvConfig};
@@ -25,7 +26,8 @@ pub struct TractEncoder {
 }
 
 impl TractEncoder {
-    /// Builds the network, at the start of a signal. Weights of every scheme are computed with as floats.
+    /// Builds the network, at the start of a signal. Weights of every scheme are computed with as
+    /// floats.
     ///
     /// # Errors
     /// [`ErrorKind::BundleInvalid`] when config and weights disagree or tract refuses the network.
@@ -56,11 +58,12 @@ impl TractEncoder {
         Ok(())
     }
 
-    /// As [`super::AudioEncoder::encode`], for whole blocks: `samples` is a multiple of 3200, `out` is row-major
-    /// `[samples.len() / 800, features]`. Allocates.
+    /// As [`super::AudioEncoder::encode`], for whole blocks: `samples` is a multiple of 3200, `out`
+    /// is row-major `[samples.len() / 800, features]`. Allocates.
     ///
     /// # Errors
-    /// [`ErrorKind::BundleInvalid`] when tract fails to run the network; the state is then at the last whole block.
+    /// [`ErrorKind::BundleInvalid`] when tract fails to run the network; the state is then at the
+    /// last whole block.
     ///
     /// # Panics
     /// When lengths disagree.
@@ -127,7 +130,8 @@ fn build(
     model.into_optimized()?.into_runnable()
 }
 
-/// Time-major convolution without padding: `[rows, inputs]` to `[(rows - kernel) / stride + 1, outputs]`.
+/// Time-major convolution without padding: `[rows, inputs]` to `[(rows - kernel) / stride + 1,
+/// outputs]`.
 fn convolution(
     model: &mut TypedModel,
     name: &str,

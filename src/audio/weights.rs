@@ -8,7 +8,8 @@ use crate::kernels::{Kernels, Matrix, Weights};
 /// One layer as a bundle holds it.
 #[derive(Debug, Clone, Copy)]
 pub struct LayerWeights<'a> {
-    /// Convolution: `[outputs, kernel, inputs]`, so that a row is a window of time-major input; output layer: `[features, last]`.
+    /// Convolution: `[outputs, kernel, inputs]`, so that a row is a window of time-major input;
+    /// output layer: `[features, last]`.
     pub weights: Weights<'a>,
     /// One value an output.
     pub bias: &'a [f32],
@@ -38,7 +39,8 @@ impl AudioWeights {
     /// Checks and packs `layers` (first to last) and the output layer.
     ///
     /// # Errors
-    /// [`ErrorKind::BundleInvalid`] as [`check_audio_config`], and when weights and config disagree.
+    /// [`ErrorKind::BundleInvalid`] as [`check_audio_config`], and when weights and config
+    /// disagree.
     pub fn new(
         kernels: &Kernels,
         config: &AudioConfig,
@@ -81,8 +83,9 @@ pub(super) fn check_weights(config: &AudioConfig, layers: &[LayerWeights<'_>], o
 /// Refuses layer lists that are not one vector a frame of 800 mono samples.
 ///
 /// # Errors
-/// [`ErrorKind::BundleInvalid`], naming the layer: strides that do not multiply to 800, a kernel shorter than its stride,
-/// channels that do not connect, sizes of 0 or beyond 65536, a residual layer that changes the shape.
+/// [`ErrorKind::BundleInvalid`], naming the layer: strides that do not multiply to 800, a kernel
+/// shorter than its stride, channels that do not connect, sizes of 0 or beyond 65536, a residual
+/// layer that changes the shape.
 pub fn check_audio_config(config: &AudioConfig) -> Result<()> {
     const MOST: usize = 1 << 16;
     let size = |what: String, n: usize| match n {

@@ -1,7 +1,9 @@
-//! Ranges of a config. They bound what an engine and its sessions allocate before any tensor has been looked at.
+//! Ranges of a config. They bound what an engine and its sessions allocate before any tensor has
+//! been looked at.
 //!
-//! Weights are bounded by the file's own size, since each tensor must have the shape that the config gives. Caches and scratch are not,
-//! so what a session would take is counted and must not exceed [`MAX_SESSION`].
+//! Weights are bounded by the file's own size, since each tensor must have the shape that the
+//! config gives. Caches and scratch are not, so what a session would take is counted and must not
+//! exceed [`MAX_SESSION`].
 
 use super::invalid;
 use crate::audio::check_audio_config;
@@ -10,8 +12,8 @@ use crate::error::Result;
 use crate::frame::feature_count;
 use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES};
 
-/// Most memory that a session may take for caches and scratch, bytes. Sessions of the shipped model take 20 MB, those of a
-/// model of the size in the SARAH paper 60 MB.
+/// Most memory that a session may take for caches and scratch, bytes. Sessions of the shipped model
+/// take 20 MB, those of a model of the size in the SARAH paper 60 MB.
 const MAX_SESSION: u128 = 1 << 30;
 
 /// Checks every number of `config` against its range.
@@ -97,14 +99,15 @@ fn gaze(g: &GazeConfig) -> Result<()> {
     real("gaze.seconds", g.seconds, 0.1, 3600.0)
 }
 
-/// Bytes that a session takes at most, caches in f32; slots of their own that Euler samplers ask for come on top.
+/// Bytes that a session takes at most, caches in f32; slots of their own that Euler samplers ask
+/// for come on top.
 fn session_bytes(c: &Config) -> u128 {
     let product = |factors: &[usize]| factors.iter().map(|n| *n as u128).product::<u128>();
     let (v, w) = (&c.vae, &c.flow);
     let features = feature_count(c.rig.joints.len());
     // Keys and values of eight slots with three branches and of the student.
     let flow = product(&[2, 25, w.layers, w.window_blocks + 8, w.width]);
-    // Encoder, two decoders; six tokens a block.
+    // Encoder, two decoders; six tokens per block.
     let vae = product(&[2, 3, v.layers, 6 * v.window_blocks, v.width]);
     let tokens = product(&[w.window_blocks + 9, 2 * v.latent + 8 + 8 * c.audio.features + 2 * w.width]);
     let anchor = product(&[w.window_blocks + 1, BLOCK_FRAMES * features + v.latent]);

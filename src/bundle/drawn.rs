@@ -1,11 +1,13 @@
-//! Tensors that are drawn from their names instead of read: networks of sizes for which there is no bundle, to measure their speed.
+//! Tensors that are drawn from their names instead of read: networks of sizes for which there is no
+//! bundle, to measure their speed.
 
 use super::{IDLE_LATENTS, SMALL, StoredData, StoredWeights};
 use crate::frame::BLOCK_FRAMES;
 use crate::kernels::{I4_GROUP, Scheme};
 use half::f16;
 
-/// Rows of a matrix that may have any number: an idle clip of two blocks, a row a frame, or a block as latents.
+/// Rows of a matrix that may have any number: an idle clip of two blocks, a row a frame, or a block
+/// as latents.
 pub(super) fn rows(name: &str) -> usize {
     if name == IDLE_LATENTS { 2 } else { 2 * BLOCK_FRAMES }
 }
@@ -42,7 +44,8 @@ impl Source {
     }
 }
 
-/// Standard deviations are 1, others spread evenly around 0 within one over the root of the row's length.
+/// Standard deviations are 1, others spread evenly around 0 within one over the root of the row's
+/// length.
 pub(super) fn floats(name: &str, shape: &[usize]) -> Vec<f32> {
     let count = shape.iter().product();
     if name.ends_with("_std") {
@@ -53,7 +56,8 @@ pub(super) fn floats(name: &str, shape: &[usize]) -> Vec<f32> {
     (0..count).map(|_| scale * source.unit()).collect()
 }
 
-/// Weights of the same spread, drawn in their scheme; matrices that are too small to be quantised are half floats, as in bundles.
+/// Weights of the same spread, drawn in their scheme; matrices that are too small to be quantised
+/// are half floats, as in bundles.
 pub(super) fn weights(name: &str, rows: usize, cols: usize, scheme: Scheme) -> StoredWeights {
     let mut source = Source::new(name);
     let scheme = match scheme {

@@ -18,14 +18,17 @@ const RELEASED: usize = 1 << 18;
 /// How a bundle's file is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum LoadMode {
-    /// Mapped: pages are read as they are needed and belong to the system's cache. The file must not be changed or cut while it
-    /// is being loaded: numbers that change are checked like any others, but **a file that is cut while it is mapped
-    /// kills the process** with a bus error (`SIGBUS`) where the system has mapped files at all. Replacing it by a rename, as installers do, is fine: the
-    /// mapped file lives on. Once an engine has been made, its file is not read again.
+    /// Mapped: pages are read as they are needed and belong to the system's cache. The file must
+    /// not be changed or cut while it is being loaded: numbers that change are checked like any
+    /// others, but **a file that is cut while it is mapped kills the process** with a bus error
+    /// (`SIGBUS`) where the system has mapped files at all. Replacing it by a rename, as installers
+    /// do, is fine: the mapped file lives on. Once an engine has been made, its file is not read
+    /// again.
     #[default]
     Map,
-    /// Copied to memory first, and read once: whatever happens to the file, the outcome is an engine or a typed error. Takes
-    /// the file's size of memory while loading. For files that others may write to.
+    /// Copied to memory first, and read once: whatever happens to the file, the outcome is an
+    /// engine or a typed error. Takes the file's size of memory while loading. For files that
+    /// others may write to.
     Copy,
 }
 
@@ -45,7 +48,8 @@ enum Bytes<'a> {
 }
 
 impl<'a> BundleFile<'a> {
-    /// Maps the file at `path` (on Android: reads it): see [`LoadMode::Map`] for what must not happen to it meanwhile.
+    /// Maps the file at `path` (on Android: reads it): see [`LoadMode::Map`] for what must not
+    /// happen to it meanwhile.
     ///
     /// # Errors
     /// [`ErrorKind::Io`] when it cannot be opened or mapped.
@@ -56,7 +60,8 @@ impl<'a> BundleFile<'a> {
     /// Maps or copies the file at `path`.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`] when it cannot be opened, mapped or read, or is longer than 4 GiB and to be copied.
+    /// [`ErrorKind::Io`] when it cannot be opened, mapped or read, or is longer than 4 GiB and to
+    /// be copied.
     pub fn open_with(path: impl AsRef<Path>, mode: LoadMode) -> Result<Self> {
         let path = path.as_ref();
         if mode == LoadMode::Copy {
@@ -67,12 +72,14 @@ impl<'a> BundleFile<'a> {
         Self::open_part(&File::open(path).map_err(io)?, 0, None, path)
     }
 
-    /// Maps (on Android: reads) `length` bytes from `offset` on of an open file (`None`: all that follow): a bundle that lies in another file,
-    /// such as an asset that is stored uncompressed in an APK. `name` stands for it in errors. The file may be closed
-    /// afterwards; otherwise as [`BundleFile::open`].
+    /// Maps (on Android: reads) `length` bytes from `offset` on of an open file (`None`: all that
+    /// follow): a bundle that lies in another file, such as an asset that is stored uncompressed in
+    /// an APK. `name` stands for it in errors. The file may be closed afterwards; otherwise as
+    /// [`BundleFile::open`].
     ///
     /// # Errors
-    /// [`ErrorKind::Io`] when it cannot be mapped, [`ErrorKind::Argument`] when the file is shorter.
+    /// [`ErrorKind::Io`] when it cannot be mapped, [`ErrorKind::Argument`] when the file is
+    /// shorter.
     pub fn open_part(file: &File, offset: u64, length: Option<u64>, name: impl Into<PathBuf>) -> Result<Self> {
         let path = name.into();
         let io = |e| Error::io("map the bundle", &path, e);
@@ -123,8 +130,8 @@ impl<'a> BundleFile<'a> {
         }
     }
 
-    /// Lets go of the pages of `part`, a part of these bytes that has been read: if the file is mapped they leave this process's memory, and
-    /// reading them again would bring them back.
+    /// Lets go of the pages of `part`, a part of these bytes that has been read: if the file is
+    /// mapped they leave this process's memory, and reading them again would bring them back.
     #[cfg_attr(
         any(not(unix), target_os = "android"),
         allow(unused_variables, clippy::unused_self, reason = "nothing is mapped there")
@@ -134,7 +141,8 @@ impl<'a> BundleFile<'a> {
         if let (Bytes::Mapped(map), RELEASED..) = (&self.bytes, part.len()) {
             let from = part.as_ptr().addr() - map.as_ptr().addr();
             #[allow(unsafe_code, reason = "mapping a file is unsafe by nature")]
-            // SAFETY: nobody writes through the map, so its pages hold what the file holds, and are read from it again.
+            // SAFETY: nobody writes through the map, so its pages hold what the file holds, and are
+            // read from it again.
             let _ = unsafe { map.unchecked_advise_range(memmap2::UncheckedAdvice::DontNeed, from, part.len()) };
         }
     }
@@ -157,9 +165,9 @@ impl<'a> BundleFile<'a> {
 fn contents(file: &File, offset: u64, length: usize) -> std::io::Result<Bytes<'static>> {
     use memmap2::MmapOptions;
     #[allow(unsafe_code, reason = "mapping a file is unsafe by nature")]
-    // SAFETY: the map is read-only and private. Should another process change the file while it is being read,
-    // the reader may see changed numbers (they are checked after copying) or, if the file shrinks, a bus error:
-    // the condition that `LoadMode::Map` states.
+    // SAFETY: the map is read-only and private. Should another process change the file while it is
+    // being read, the reader may see changed numbers (they are checked after copying) or, if the
+    // file shrinks, a bus error: the condition that `LoadMode::Map` states.
     let map = unsafe { MmapOptions::new().offset(offset).len(length).map(file) }?;
     Ok(Bytes::Mapped(map))
 }

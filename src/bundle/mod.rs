@@ -1,7 +1,9 @@
-//! Bundles: one safetensors file that holds a model's weights and, in its metadata, its configuration.
+//! Bundles: one safetensors file that holds a model's weights and, in its metadata, its
+//! configuration.
 //!
-//! Opening a bundle checks everything before any of it is used: the container, the config's ranges, each tensor's name,
-//! dtype and shape, and that every number is finite. Sizes are bounded by the file's own before memory is taken.
+//! Opening a bundle checks everything before any of it is used: the container, the config's ranges,
+//! each tensor's name, dtype and shape, and that every number is finite. Sizes are bounded by the
+//! file's own before memory is taken.
 
 mod audio;
 mod check;

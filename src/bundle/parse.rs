@@ -4,14 +4,16 @@ use super::{BundleFile, Tensors, check, corrupt, invalid};
 use crate::config::{Config, FORMAT};
 use crate::error::{Error, ErrorKind, Result};
 
-/// Largest header that is parsed, bytes: metadata of thousands of tensors take well under one mebibyte.
+/// Largest header that is parsed, bytes: metadata of thousands of tensors take well under one
+/// mebibyte.
 const MAX_HEADER: u64 = 4 << 20;
 
 impl BundleFile<'_> {
     /// Parses the container and the config, and checks both.
     ///
     /// # Errors
-    /// [`ErrorKind::BundleCorrupt`], [`ErrorKind::BundleVersion`] or [`ErrorKind::BundleInvalid`], naming the file.
+    /// [`ErrorKind::BundleCorrupt`], [`ErrorKind::BundleVersion`] or [`ErrorKind::BundleInvalid`],
+    /// naming the file.
     pub fn parse(&self) -> Result<(Config, Tensors<'_>)> {
         self.parse_inner().map_err(|e| e.with_path(self.path()))
     }

@@ -42,8 +42,8 @@ impl<'a> Tensors<'a> {
     /// Reads a vector or matrix of the given shape, f32 or f16 in the file, as f32.
     ///
     /// # Errors
-    /// [`ErrorKind::BundleInvalid`] when it is missing or of another dtype or shape, [`ErrorKind::BundleCorrupt`] when
-    /// a number is not finite.
+    /// [`ErrorKind::BundleInvalid`] when it is missing or of another dtype or shape,
+    /// [`ErrorKind::BundleCorrupt`] when a number is not finite.
     pub fn f32(&self, name: &str, shape: &[usize]) -> Result<Vec<f32>> {
         if self.drawn.is_some() {
             return Ok(self.draw(name, shape));
@@ -52,7 +52,8 @@ impl<'a> Tensors<'a> {
         floats(name, &view)
     }
 
-    /// Reads a matrix `[rows, columns]` of any number of rows, as f32; returns the number of rows too.
+    /// Reads a matrix `[rows, columns]` of any number of rows, as f32; returns the number of rows
+    /// too.
     ///
     /// # Errors
     /// As [`Tensors::f32`].
@@ -77,8 +78,8 @@ impl<'a> Tensors<'a> {
         values
     }
 
-    /// Reads the weights `{name}.weight` (`[outputs, inputs]`; higher ranks are flattened after the first axis) in the scheme that the
-    /// config records, with `{name}.scale` where it has scales:
+    /// Reads the weights `{name}.weight` (`[outputs, inputs]`; higher ranks are flattened after the
+    /// first axis) in the scheme that the config records, with `{name}.scale` where it has scales:
     ///
     /// | scheme | `{name}.weight` | `{name}.scale` |
     /// |---|---|---|
@@ -87,15 +88,16 @@ impl<'a> Tensors<'a> {
     /// | `i4` | U8 `[outputs, ceil(inputs / 2)]` | F16 `[outputs, ceil(inputs / 32)]` |
     ///
     /// # Errors
-    /// As [`Tensors::f32`]; [`ErrorKind::BundleInvalid`] also when dtype and record disagree, [`ErrorKind::BundleCorrupt`] for a
-    /// scale that is not finite, or of int8 negative.
+    /// As [`Tensors::f32`]; [`ErrorKind::BundleInvalid`] also when dtype and record disagree,
+    /// [`ErrorKind::BundleCorrupt`] for a scale that is not finite, or of int8 negative.
     pub fn weights(&self, name: &str, outputs: usize, inputs: &[usize]) -> Result<StoredWeights> {
         let data = self.values(name, outputs, inputs)?.copied();
         Ok(StoredWeights { rows: outputs, cols: inputs.iter().product(), data })
     }
 
-    /// Reads `{name}.weight` (as [`Tensors::weights`]) and `{name}.bias` and packs them for the kernels at hand. Quantised weights are packed from
-    /// where they lie, and pages of a mapped file that have been packed leave this process's memory.
+    /// Reads `{name}.weight` (as [`Tensors::weights`]) and `{name}.bias` and packs them for the
+    /// kernels at hand. Quantised weights are packed from where they lie, and pages of a mapped
+    /// file that have been packed leave this process's memory.
     ///
     /// # Errors
     /// As [`Tensors::weights`].
@@ -194,7 +196,8 @@ fn floats(name: &str, view: &TensorView<'_>) -> Result<Vec<f32>> {
     }
 }
 
-/// The values, if all are numbers; without an early end, which would keep compilers from looking at many at once.
+/// The values, if all are numbers; without an early end, which would keep compilers from looking at
+/// many at once.
 fn finite<T: Copy + std::fmt::Display>(name: &str, values: Vec<T>, is_finite: impl Fn(T) -> bool) -> Result<Vec<T>> {
     if values.iter().fold(true, |all, v| all & is_finite(*v)) {
         return Ok(values);

@@ -23,7 +23,8 @@ pub(crate) fn assemble(config: &serde_json::Value, entries: &[Entry]) -> Result<
     safetensors::serialize(views, Some(metadata)).map_err(failed)
 }
 
-/// The tensors of layer `name`: its weights, of shape `shape` where they are not packed, and their scales.
+/// The tensors of layer `name`: its weights, of shape `shape` where they are not packed, and their
+/// scales.
 pub(crate) fn entries(name: &str, shape: &[usize], weights: &StoredWeights) -> Vec<Entry> {
     let (weight, scale) = (format!("{name}.weight"), format!("{name}.scale"));
     let halves = |w: &[f16]| w.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>();

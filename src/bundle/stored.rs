@@ -3,11 +3,12 @@
 use crate::kernels::{Kernels, Matrix, Scheme, WeightData, Weights};
 use half::f16;
 
-/// Matrices with fewer weights than this stay floats in int8 and int4 bundles, if nothing else is asked for: together they
-/// are less than a hundredth of a bundle.
+/// Matrices with fewer weights than this stay floats in int8 and int4 bundles, if nothing else is
+/// asked for: together they are less than a hundredth of a bundle.
 pub const SMALL: usize = 8192;
 
-/// Weights of one layer in their scheme: `rows` outputs x `cols` inputs, row-major. Convolutions are flattened after the first axis.
+/// Weights of one layer in their scheme: `rows` outputs x `cols` inputs, row-major. Convolutions
+/// are flattened after the first axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredWeights {
     /// Output features.
@@ -25,7 +26,7 @@ pub enum StoredData {
     F32(Vec<f32>),
     /// Half floats.
     F16(Vec<f16>),
-    /// Int8 values and a scale a row.
+    /// Int8 values and a scale per row.
     I8 {
         /// Values.
         q: Vec<i8>,
@@ -53,12 +54,14 @@ impl StoredData {
     }
 }
 
-/// Whether integer weights of layer `name` are multiplied with int16 activations rather than int8 ones.
+/// Whether integer weights of layer `name` are multiplied with int16 activations rather than int8
+/// ones.
 ///
-/// Measured on the base model, the rounding of activations is nearly all that an int8 bundle loses, and most of it where nothing after it evens
-/// it out: in the decoder, where every error is one of the pose; in the last layer of the flow, whose error guidance multiplies; in the
-/// maps from flow time, whose error all tokens share; at both ends of the encoder. The flow's transformer layers, where a block's time goes, take
-/// int8.
+/// Measured on the base model, the rounding of activations is nearly all that an int8 bundle loses,
+/// and most of it where nothing after it evens it out: in the decoder, where every error is one of
+/// the pose; in the last layer of the flow, whose error guidance multiplies; in the maps from flow
+/// time, whose error all tokens share; at both ends of the encoder. The flow's transformer layers,
+/// where a block's time goes, take int8.
 pub fn int16_activations(name: &str) -> bool {
     let (network, layer) = name.split_once('.').unwrap_or_default();
     match network {
@@ -95,7 +98,8 @@ impl StoredWeights {
         self.borrow().to_f32()
     }
 
-    /// Columns `range` of weights whose values are `floats`, packed: half floats as they are, all others as floats.
+    /// Columns `range` of weights whose values are `floats`, packed: half floats as they are, all
+    /// others as floats.
     pub(crate) fn pack_columns(
         &self,
         floats: &[f32],

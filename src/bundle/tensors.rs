@@ -26,7 +26,8 @@ pub struct TensorInfo {
 }
 
 impl TensorInfo {
-    /// Number of parameters; the padding of int4 rows of odd length counts, scales of quantised weights do not.
+    /// Number of parameters; the padding of int4 rows of odd length counts, scales of quantised
+    /// weights do not.
     pub fn elements(&self) -> usize {
         let n = self.shape.iter().product();
         match self.dtype.as_str() {
@@ -37,8 +38,8 @@ impl TensorInfo {
     }
 }
 
-/// The tensors of a parsed bundle. Each read checks name, dtype, shape and finiteness, and is remembered, so that
-/// [`Tensors::finish`] can name what nobody asked for.
+/// The tensors of a parsed bundle. Each read checks name, dtype, shape and finiteness, and is
+/// remembered, so that [`Tensors::finish`] can name what nobody asked for.
 #[derive(Debug)]
 pub struct Tensors<'a> {
     container: Option<SafeTensors<'a>>,
@@ -69,8 +70,8 @@ impl<'a> Tensors<'a> {
         Self { container, file, drawn: None, kept: None, quantisation, read: RefCell::default() }
     }
 
-    /// No bundle: every tensor that is asked for is there, drawn from its name, weights of some size in `scheme`. To measure
-    /// networks of sizes for which there is no bundle.
+    /// No bundle: every tensor that is asked for is there, drawn from its name, weights of some
+    /// size in `scheme`. To measure networks of sizes for which there is no bundle.
     #[cfg(feature = "internals")]
     pub fn seeded(scheme: Scheme) -> Self {
         let drawn = Some(scheme);
@@ -95,7 +96,8 @@ impl<'a> Tensors<'a> {
         assemble(&serde_json::to_value(&config).map_err(failed)?, &kept.entries)
     }
 
-    /// Names, dtypes, shapes and sizes, sorted by name; the dtype of quantised weights is their scheme.
+    /// Names, dtypes, shapes and sizes, sorted by name; the dtype of quantised weights is their
+    /// scheme.
     pub fn infos(&self) -> Vec<TensorInfo> {
         let mut infos: Vec<_> = (self.container.iter().flat_map(SafeTensors::iter))
             .map(|(name, view)| TensorInfo {
@@ -112,7 +114,8 @@ impl<'a> Tensors<'a> {
         infos
     }
 
-    /// Whether the bundle holds a tensor of this name; one that is drawn, whatever bundles of its scheme may hold.
+    /// Whether the bundle holds a tensor of this name; one that is drawn, whatever bundles of its
+    /// scheme may hold.
     pub fn has(&self, name: &str) -> bool {
         match (&self.container, self.drawn) {
             (Some(container), _) => container.tensor(name).is_ok(),
@@ -120,7 +123,8 @@ impl<'a> Tensors<'a> {
         }
     }
 
-    /// Leaves the tensors whose names begin with `prefix` alone: [`Tensors::finish`] does not miss them.
+    /// Leaves the tensors whose names begin with `prefix` alone: [`Tensors::finish`] does not miss
+    /// them.
     pub fn skip(&self, prefix: &str) {
         let recorded = self.quantisation.iter().flat_map(|q| q.tensors.keys().map(String::as_str));
         let names = self.container.iter().flat_map(SafeTensors::names).chain(recorded);
@@ -130,7 +134,8 @@ impl<'a> Tensors<'a> {
     /// Fails if the bundle holds, or its config records, tensors that nothing has read.
     ///
     /// # Errors
-    /// [`ErrorKind::BundleInvalid`](crate::error::ErrorKind::BundleInvalid) naming the first of them.
+    /// [`ErrorKind::BundleInvalid`](crate::error::ErrorKind::BundleInvalid) naming the first of
+    /// them.
     pub fn finish(&self) -> Result<()> {
         let read = self.read.borrow();
         let recorded = self.quantisation.iter().flat_map(|q| q.tensors.keys().map(String::as_str));

@@ -33,7 +33,7 @@ struct Layer {
 
 #[cfg(feature = "internals")]
 impl Activations {
-    /// Keeps at most `limit` rows a layer, from every `every`-th call (1: from each).
+    /// Keeps at most `limit` rows per layer, from every `every`-th call (1: from each).
     pub fn new(limit: usize, every: usize) -> Self {
         Self { limit, every: every.max(1), moments: false, layers: BTreeMap::new() }
     }

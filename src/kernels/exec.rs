@@ -23,12 +23,14 @@ pub struct Limits {
 
 /// Kernels, threads and scratch of one session.
 ///
-/// After [`new`](Self::new) no method allocates, locks or enters the kernel, but for [`begin`](Self::begin) and
-/// [`end`](Self::end), between which the second thread helps; outside of them the methods work, on the calling thread alone.
-/// Results have the same bits with one and two threads: work is split over results, never over a sum. But for flush-to-zero,
-/// they also have the same bits inside and outside.
+/// After [`new`](Self::new) no method allocates, locks or enters the kernel, but for
+/// [`begin`](Self::begin) and [`end`](Self::end), between which the second thread helps; outside of
+/// them the methods work, on the calling thread alone. Results have the same bits with one and two
+/// threads: work is split over results, never over a sum. But for flush-to-zero, they also have the
+/// same bits inside and outside.
 ///
-/// Methods panic when lengths disagree with the shapes in their description: that is an error of the program.
+/// Methods panic when lengths disagree with the shapes in their description: that is an error of
+/// the program.
 pub struct Exec {
     pub(super) kernels: Kernels,
     pub(super) pool: Pool,
@@ -45,7 +47,8 @@ impl Exec {
     /// Allocates scratch and, for `threads` = 2, starts the helper thread.
     ///
     /// # Errors
-    /// [`ErrorKind::Argument`] when `threads` is not 1 or 2; [`ErrorKind::Io`] when the thread cannot be started.
+    /// [`ErrorKind::Argument`] when `threads` is not 1 or 2; [`ErrorKind::Io`] when the thread
+    /// cannot be started.
     pub fn new(kernels: Kernels, threads: usize, limits: Limits) -> Result<Exec> {
         if !(1..=2).contains(&threads) {
             return Err(Error::new(ErrorKind::Argument, format!("threads = {threads}: use 1 or 2")));
@@ -79,19 +82,22 @@ impl Exec {
         &self.pool
     }
 
-    /// Lets `activations` listen to the linear layers from here on (`None`: nobody) and returns what listened so far.
+    /// Lets `activations` listen to the linear layers from here on (`None`: nobody) and returns
+    /// what listened so far.
     #[cfg(feature = "internals")]
     pub fn listen(&mut self, activations: Option<Activations>) -> Option<Activations> {
         std::mem::replace(&mut self.activations, activations)
     }
 
-    /// Starts a stretch of work: the helper wakes up and spins, and denormals count as zero on both threads. Calling it twice is harmless.
+    /// Starts a stretch of work: the helper wakes up and spins, and denormals count as zero on both
+    /// threads. Calling it twice is harmless.
     pub fn begin(&mut self) {
         self.flush.get_or_insert_with(FlushToZero::new);
         self.pool.begin();
     }
 
-    /// Ends it, on the thread that began it: the helper parks and the floating-point mode is as before.
+    /// Ends it, on the thread that began it: the helper parks and the floating-point mode is as
+    /// before.
     pub fn end(&mut self) {
         self.pool.end();
         self.flush = None;
@@ -106,13 +112,14 @@ impl Exec {
         self.scratch.linear(&self.kernels, &mut self.pool, w, x, rows, y, e, after);
     }
 
-    /// Says that the linear layer after the next one is of `w`: threads that run out of the one's weights
-    /// prefetch the other's.
+    /// Says that the linear layer after the next one is of `w`: threads that run out of the one's
+    /// weights prefetch the other's.
     pub fn expect(&mut self, w: &Matrix) {
         self.upcoming = w.ends();
     }
 
-    /// Layer normalisation of each of `rows` rows of `dim` values, eps 1e-5: y = layernorm(x) * scale + shift, `scale` holding 1 + s.
+    /// Layer normalisation of each of `rows` rows of `dim` values, eps 1e-5: y = layernorm(x) *
+    /// scale + shift, `scale` holding 1 + s.
     pub fn norm(
         &mut self,
         x: &[f32],
@@ -131,8 +138,8 @@ impl Exec {
         });
     }
 
-    /// Rotary positions, half-split, on the first `heads * head_dim` values of each of `rows` rows of `row_stride` values;
-    /// `cos` and `sin` are `rows` x `head_dim / 2`.
+    /// Rotary positions, half-split, on the first `heads * head_dim` values of each of `rows` rows
+    /// of `row_stride` values; `cos` and `sin` are `rows` x `head_dim / 2`.
     #[allow(clippy::too_many_arguments, reason = "a kernel's operands and shape")]
     pub fn rope(
         &mut self,
@@ -160,8 +167,9 @@ impl Exec {
         });
     }
 
-    /// Attention: row r of `q` (`row_stride` values, of which the first `cache.dim()` are the heads' queries) over `spans[r]`,
-    /// scores divided by sqrt(head_dim), into row r of `y` (`spans.len()` x `cache.dim()`).
+    /// Attention: row r of `q` (`row_stride` values, of which the first `cache.dim()` are the
+    /// heads' queries) over `spans[r]`, scores divided by sqrt(head_dim), into row r of `y`
+    /// (`spans.len()` x `cache.dim()`).
     pub fn attend(&mut self, q: &[f32], row_stride: usize, cache: &KvCache, spans: &[Span], y: &mut [f32]) {
         let (rows, dim, heads, head_dim) = (spans.len(), cache.dim(), cache.heads(), cache.head_dim());
         assert!(dim <= row_stride, "attend: dim fits a row");

@@ -12,7 +12,7 @@ const LOW: u64 = u32::MAX as u64;
 /// Columns that are read at once: a cache line of each row.
 const COLS: usize = 64;
 
-/// Columns `0 .. n` of 16 rows of `cols` bytes as lines of 4 columns a row, each pair of words
+/// Columns `0 .. n` of 16 rows of `cols` bytes as lines of 4 columns per row, each pair of words
 /// through `map`; returns n, a multiple of 16. The line of columns `4 i ..` begins at byte `64 i`
 /// of `panel`.
 #[inline(always)]
@@ -44,7 +44,7 @@ pub(super) fn quads(rows: &[i8], cols: usize, panel: &mut [u8], map: impl Fn(u64
     done
 }
 
-/// Columns `0 .. n` of 16 rows of `cols` bytes as pairs of lines, 8 columns a row; returns n, a
+/// Columns `0 .. n` of 16 rows of `cols` bytes as pairs of lines, 8 columns per row; returns n, a
 /// multiple of 16. The lines of columns `8 i ..` begin at byte `128 i` of `panel`.
 pub(super) fn octets(rows: &[i8], cols: usize, panel: &mut [u8]) -> usize {
     let done = cols / 16 * 16;

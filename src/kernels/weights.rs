@@ -29,7 +29,7 @@ pub enum WeightData<'a> {
     I8 {
         /// `rows * cols` values.
         q: &'a [i8],
-        /// One scale a row.
+        /// One scale per row.
         scale: &'a [f32],
     },
     /// Group-wise int4: weight = `(n - 8) * scale[r][c / 32]`, n in 0..=15; activations are

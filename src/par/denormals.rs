@@ -1,8 +1,10 @@
 //! Flush-to-zero: denormal floats count as zero while it is on, on this thread.
 //!
-//! Denormals cost x86 cores a hundred cycles each, and a network's decaying activations make them by the thousand.
+//! Denormals cost x86 cores a hundred cycles each, and a network's decaying activations make them
+//! by the thousand.
 
-/// Turns flush-to-zero on for the current thread until it is dropped; drop it on the thread that made it, or that one stays as it is.
+/// Turns flush-to-zero on for the current thread until it is dropped; drop it on the thread that
+/// made it, or that one stays as it is.
 ///
 /// Sets FTZ and DAZ of MXCSR on x86-64 and FZ of FPCR on aarch64; elsewhere it does nothing.
 #[derive(Debug)]
@@ -58,8 +60,9 @@ fn set_control(word: u64) {
     #[cfg(target_arch = "x86_64")]
     {
         let word = word as u32;
-        // SAFETY: loads MXCSR with its own earlier value or that with FTZ and DAZ; exception masks and rounding stay as they
-        // were. The compiler assumes the default mode: it only folds constants, whose denormals no kernel here depends on.
+        // SAFETY: loads MXCSR with its own earlier value or that with FTZ and DAZ; exception masks
+        // and rounding stay as they were. The compiler assumes the default mode: it only folds
+        // constants, whose denormals no kernel here depends on.
         unsafe { std::arch::asm!("ldmxcsr [{}]", in(reg) &raw const word, options(nostack, preserves_flags)) };
     }
     #[cfg(target_arch = "aarch64")]

@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The start of a slice whose elements threads take one by one.
 struct Elements<T>(*mut T);
-// SAFETY: whoever holds it reaches disjoint elements alone: sharing it hands elements to other threads, which `T: Send`
-// allows.
+// SAFETY: whoever holds it reaches disjoint elements alone: sharing it hands elements to other
+// threads, which `T: Send` allows.
 unsafe impl<T: Send> Sync for Elements<T> {}
 
 impl<T> Elements<T> {
@@ -30,9 +30,9 @@ struct Place<'a> {
 impl<'a> Place<'a> {
     /// The first place, or the second while another thread has that.
     ///
-    /// Two threads are never in one place: the second is entered only while the other thread is in the first, and
-    /// whoever comes back to find the other in the second finds the first free. `AcqRel` hands on what was done in
-    /// either.
+    /// Two threads are never in one place: the second is entered only while the other thread is in
+    /// the first, and whoever comes back to find the other in the second finds the first free.
+    /// `AcqRel` hands on what was done in either.
     fn take(first: &'a AtomicBool) -> Self {
         Self { first, number: usize::from(first.swap(true, Ordering::AcqRel)) }
     }
@@ -55,8 +55,8 @@ impl Pool {
         self.each_with(&mut [(), ()], items, |(), i, item| work(i, item));
     }
 
-    /// The same with something for each thread to work with: `tools` are of no thread in particular, but no two calls
-    /// at a time get the same one.
+    /// The same with something for each thread to work with: `tools` are of no thread in
+    /// particular, but no two calls at a time get the same one.
     ///
     /// # Panics
     /// As [`Pool::run`].

@@ -1,148 +1,67 @@
 //! The pool: one caller, at most one helper.
 
-use std::any::Any;
-use std::cell::UnsafeCell;
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, PoisonError, mpsc};
 use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
 
-use super::FlushToZero;
-use super::cores::{self, current_thread_id};
+use super::apart::Apart;
+use super::cores::{current_thread_id, time_on_core};
+use super::ledger::{Ledger, Stretch};
+use super::shared::{Next, Shared, Work};
 use crate::error::Result;
 
 /// Pieces of one [`Pool::run`], at most.
 const MAX_PIECES: usize = u16::MAX as usize;
 
-/// Spins before the caller lets another thread have its core; about a millisecond, reached only where the helper lost its own.
+/// Spins at the end of a run after which the caller's wait for the helper is timed.
+const PATIENCE: u32 = 1 << 10;
+/// Spins after which the caller lets another thread have its core; about a millisecond, reached
+/// only where the helper lost its own.
 const SPINS: u32 = 1 << 15;
-
-/// Where a thread probably goes on after a piece: a hint for prefetching.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Next {
-    /// With this piece.
-    Piece(usize),
-    /// With the first piece of the next run.
-    First,
-    /// With the last piece of the next run.
-    Last,
-}
-
-/// A piece, and where the thread goes on.
-type Work<'a> = dyn Fn(usize, Next) + Sync + 'a;
-
-/// Keeps what the threads write out of each other's cache lines.
-#[repr(align(128))]
-struct Line<T>(T);
-
-struct Shared {
-    /// Pieces left: run number (32 bits), first (16), end (16).
-    ticket: Line<AtomicU64>,
-    /// Pieces of this run that the helper has finished.
-    done: Line<AtomicU32>,
-    awake: Line<AtomicBool>,
-    quit: AtomicBool,
-    panicked: AtomicBool,
-    /// The current work. Written by the caller while no piece is left; read by the helper between taking a piece and counting it.
-    work: UnsafeCell<Option<*const Work<'static>>>,
-    payload: Mutex<Option<Box<dyn Any + Send>>>,
-}
-
-// SAFETY: `work` is the one field that is not Sync by itself; taking a piece acquires the caller's release of the ticket that
-// followed its write, and the caller writes again only after it has acquired the helper's count of every piece taken.
-unsafe impl Sync for Shared {}
-// SAFETY: the pointer in `work` is to a `Sync` closure that outlives the run.
-unsafe impl Send for Shared {}
-
-impl Shared {
-    /// Takes a piece of the current run, from the front or the back. Of two that are left the other thread takes the second.
-    fn take(&self, front: bool) -> Option<(usize, Next)> {
-        let mut seen = self.ticket.0.load(Ordering::Relaxed);
-        loop {
-            let (first, end) = ((seen >> 16) & 0xffff, seen & 0xffff);
-            if first >= end {
-                return None;
-            }
-            let (piece, next) = if front { (first, seen + (1 << 16)) } else { (end - 1, seen - 1) };
-            match self.ticket.0.compare_exchange_weak(seen, next, Ordering::Acquire, Ordering::Relaxed) {
-                Ok(_) => {
-                    let next = match (end - first > 2, front) {
-                        (true, true) => Next::Piece(piece as usize + 1),
-                        (true, false) => Next::Piece(piece as usize - 1),
-                        (false, true) => Next::First,
-                        (false, false) => Next::Last,
-                    };
-                    return Some((piece as usize, next));
-                }
-                Err(now) => seen = now,
-            }
-        }
-    }
-
-    fn help(&self) {
-        while !self.quit.load(Ordering::Acquire) {
-            if !self.awake.0.load(Ordering::Acquire) {
-                thread::park();
-                continue;
-            }
-            let _flush = FlushToZero::new();
-            while self.awake.0.load(Ordering::Relaxed) {
-                let Some((piece, next)) = self.take(false) else {
-                    std::hint::spin_loop();
-                    continue;
-                };
-                // SAFETY: a taken piece keeps the caller in `run`, so `work` is set, not written to, and what it points to is alive.
-                let work = unsafe { (*self.work.get()).map(|w| &*w) };
-                let outcome = catch_unwind(AssertUnwindSafe(|| {
-                    if let Some(work) = work {
-                        work(piece, next);
-                    }
-                }));
-                if let Err(payload) = outcome {
-                    *self.payload.lock().unwrap_or_else(PoisonError::into_inner) = Some(payload);
-                    self.panicked.store(true, Ordering::Relaxed);
-                }
-                self.done.0.fetch_add(1, Ordering::Release);
-            }
-        }
-    }
-}
 
 /// One or two threads that share out the pieces of a loop.
 pub struct Pool {
     shared: Arc<Shared>,
-    helper: Option<JoinHandle<()>>,
-    helper_id: Option<u32>,
+    helper: Option<Helper>,
     run: u32,
 }
 
+/// The second thread.
+struct Helper {
+    thread: JoinHandle<()>,
+    id: Option<u32>,
+    apart: Apart,
+    ledger: Ledger,
+    /// Since the last [`Pool::begin`].
+    stretch: Stretch,
+    /// When that was, and what the caller had had of a core by then.
+    began: Option<(Instant, Duration)>,
+}
+
 impl Pool {
-    /// A pool of `threads` threads, the caller included: 1 starts none, 2 (or more) starts one helper, parked.
+    /// A pool of `threads` threads, the caller included: 1 starts none, 2 (or more) starts one
+    /// helper, parked.
     ///
     /// # Errors
     /// When the operating system cannot start a thread.
     pub fn new(threads: usize) -> io::Result<Self> {
-        let shared = Arc::new(Shared {
-            ticket: Line(AtomicU64::new(0)),
-            done: Line(AtomicU32::new(0)),
-            awake: Line(AtomicBool::new(false)),
-            quit: AtomicBool::new(false),
-            panicked: AtomicBool::new(false),
-            work: UnsafeCell::new(None),
-            payload: Mutex::new(None),
-        });
+        let shared = Arc::new(Shared::default());
         if threads < 2 {
-            return Ok(Self { shared, helper: None, helper_id: None, run: 0 });
+            return Ok(Self { shared, helper: None, run: 0 });
         }
         let (tell, told) = mpsc::channel();
         let theirs = Arc::clone(&shared);
-        let helper = thread::Builder::new().name("visavis-helper".into()).spawn(move || {
+        let thread = thread::Builder::new().name("visavis-helper".into()).spawn(move || {
             let _ = tell.send(current_thread_id());
             drop(tell);
             theirs.help();
         })?;
-        Ok(Self { shared, helper: Some(helper), helper_id: told.recv().ok().flatten(), run: 0 })
+        let id = told.recv().ok().flatten();
+        let (apart, ledger, stretch) = (Apart::new(id), Ledger::new(), Stretch::default());
+        Ok(Self { shared, helper: Some(Helper { thread, id, apart, ledger, stretch, began: None }), run: 0 })
     }
 
     /// Number of threads: 1 or 2.
@@ -150,48 +69,78 @@ impl Pool {
         1 + usize::from(self.helper.is_some())
     }
 
-    /// The kernel's id of the helper thread; `None` without a helper, or where threads have no such id.
-    pub fn helper_id(&self) -> Option<u32> {
-        self.helper_id
+    /// Whether the helper takes part from the next [`begin`](Self::begin) on: false without one,
+    /// and while it costs more than it saves.
+    pub fn together(&self) -> bool {
+        self.helper.as_ref().is_some_and(|helper| helper.ledger.together())
     }
 
-    /// Lets the helper run only on the cores of `mask` (bit i: core i); does nothing without a helper.
+    /// The kernel's id of the helper thread; `None` without a helper, or where threads have no such
+    /// id.
+    pub fn helper_id(&self) -> Option<u32> {
+        self.helper.as_ref()?.id
+    }
+
+    /// Lets the helper run only on the cores of `mask` (bit i: core i); does nothing without a
+    /// helper.
     ///
     /// # Errors
     /// As [`super::pin_current_thread`].
-    pub fn pin_helper(&self, mask: u64) -> Result<()> {
-        if self.helper.is_none() { Ok(()) } else { cores::pin(self.helper_id, mask) }
+    pub fn pin_helper(&mut self, mask: u64) -> Result<()> {
+        self.helper.as_mut().map_or(Ok(()), |helper| helper.apart.choose(mask))
     }
 
-    /// Wakes the helper; from now until [`end`](Self::end) it spins for work.
+    /// Wakes the helper; from now until [`end`](Self::end) it looks for work: spinning, and in
+    /// short naps when there is none for long.
+    ///
+    /// Where other work wants the cores, so that the helper costs more than it saves, it is left
+    /// asleep.
     pub fn begin(&mut self) {
-        if let Some(helper) = &self.helper {
+        let Some(helper) = &mut self.helper else { return };
+        if helper.began.is_none() {
+            helper.began = Some((Instant::now(), time_on_core()));
+            helper.stretch = Stretch::default();
+        }
+        if helper.ledger.together() {
+            helper.apart.keep();
             self.shared.awake.0.store(true, Ordering::Release);
-            helper.thread().unpark();
+            helper.thread.thread().unpark();
         }
     }
 
-    /// Lets the helper park.
+    /// Lets the helper park. On the thread that called [`begin`](Self::begin).
     pub fn end(&mut self) {
         self.shared.awake.0.store(false, Ordering::Release);
+        let Some(helper) = &mut self.helper else { return };
+        if let Some((began, on_core)) = helper.began.take() {
+            let elapsed = began.elapsed();
+            let off = elapsed.saturating_sub(time_on_core().saturating_sub(on_core));
+            helper.ledger.enter(&Stretch { elapsed, off, ..helper.stretch });
+        }
     }
 
-    /// Calls `work(i, next)` once for each i in `0..pieces`, here and on the helper if it is awake; returns when all have returned.
-    /// `next` is where the same thread goes on, unless the other one is faster.
+    /// Calls `work(i, next)` once for each i in `0..pieces`, here and on the helper if it is awake;
+    /// returns when all have returned. `next` is where the same thread goes on, unless the other
+    /// one is faster.
     ///
     /// # Panics
-    /// With the panic of a piece, after all pieces that were begun have ended. With more than 65,535 pieces.
+    /// With the panic of a piece, after all pieces that were begun have ended. With more than
+    /// 65,535 pieces.
     pub fn run(&mut self, pieces: usize, work: &(dyn Fn(usize, Next) + Sync)) {
-        let awake = self.helper.is_some() && self.shared.awake.0.load(Ordering::Relaxed);
-        if pieces < 2 || !awake {
+        if let Some(helper) = &mut self.helper {
+            helper.stretch.pieces += pieces as u64;
+        }
+        let helper = self.helper.as_mut();
+        let shared = &*self.shared;
+        let (Some(helper), true) = (helper, pieces > 1 && shared.awake.0.load(Ordering::Relaxed)) else {
             (0..pieces)
                 .for_each(|piece| work(piece, if piece + 1 < pieces { Next::Piece(piece + 1) } else { Next::First }));
             return;
-        }
+        };
         assert!(pieces <= MAX_PIECES, "too many pieces");
-        let shared = &*self.shared;
-        // SAFETY: no piece of the last run is left or being worked on, so the helper does not read `work`. The lifetime is erased:
-        // the pointer is used only for pieces of this run, and this function does not return or unwind before they have ended.
+        // SAFETY: no piece of the last run is left or being worked on, so the helper does not read
+        // `work`. The lifetime is erased: the pointer is used only for pieces of this run, and this
+        // function does not return or unwind before they have ended.
         unsafe { *shared.work.get() = Some(std::mem::transmute::<*const Work<'_>, *const Work<'static>>(work)) };
         shared.done.0.store(0, Ordering::Relaxed);
         self.run = self.run.wrapping_add(1);
@@ -207,14 +156,7 @@ impl Pool {
         while shared.take(true).is_some() {
             mine += 1;
         }
-        let mut spins = 0;
-        while shared.done.0.load(Ordering::Acquire) + mine != pieces as u32 {
-            spins += 1;
-            if spins % SPINS == 0 {
-                thread::yield_now();
-            }
-            std::hint::spin_loop();
-        }
+        helper.wait(shared, pieces as u32 - mine);
         if let Err(payload) = outcome {
             resume_unwind(payload);
         }
@@ -223,16 +165,50 @@ impl Pool {
             resume_unwind(payload.unwrap_or_else(|| Box::new("the helper thread panicked")));
         }
     }
+
+    /// Lets the helper sleep for `ms` before it takes the next piece, or with the next one that it
+    /// takes.
+    #[cfg(test)]
+    pub(crate) fn stall(&self, ms: u32, with_a_piece: bool) {
+        self.shared.stalls[usize::from(with_a_piece)].store(ms, Ordering::Relaxed);
+    }
+}
+
+impl Helper {
+    /// Waits until the helper has done `theirs` pieces. One that kept the caller waiting for too
+    /// long leaves the stretch.
+    ///
+    /// Nothing else can be done meanwhile: the helper's piece borrows what the run was given.
+    fn wait(&mut self, shared: &Shared, theirs: u32) {
+        self.stretch.helped += u64::from(theirs);
+        let (mut spins, mut since) = (0u32, None);
+        while shared.done.0.load(Ordering::Acquire) != theirs {
+            spins = spins.wrapping_add(1);
+            if spins == PATIENCE {
+                since.get_or_insert_with(Instant::now);
+            }
+            if spins.is_multiple_of(SPINS) {
+                thread::yield_now();
+            }
+            std::hint::spin_loop();
+        }
+        if let Some(since) = since {
+            self.stretch.waited += since.elapsed();
+            if self.ledger.exceeds(self.stretch.waited) {
+                shared.awake.0.store(false, Ordering::Release);
+            }
+        }
+    }
 }
 
 impl Drop for Pool {
     fn drop(&mut self) {
         self.shared.quit.store(true, Ordering::Release);
-        self.end();
-        if let Some(helper) = self.helper.take() {
-            helper.thread().unpark();
+        self.shared.awake.0.store(false, Ordering::Release);
+        if let Some(Helper { thread, .. }) = self.helper.take() {
+            thread.thread().unpark();
             // The helper catches panics of the work, so there is nothing to report.
-            let _ = helper.join();
+            let _ = thread.join();
         }
     }
 }
@@ -240,85 +216,5 @@ impl Drop for Pool {
 impl std::fmt::Debug for Pool {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "Pool({} threads)", self.threads())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::sync::atomic::AtomicUsize;
-
-    #[test]
-    fn every_piece_once_over_many_runs() {
-        for threads in [1, 2] {
-            let mut pool = Pool::new(threads).unwrap();
-            assert_eq!(pool.threads(), threads);
-            for round in 0..3 {
-                if round > 0 {
-                    pool.begin();
-                }
-                for pieces in (0..200).chain([1000]) {
-                    let counts: Vec<AtomicUsize> = (0..pieces).map(|_| AtomicUsize::new(0)).collect();
-                    pool.run(pieces, &|i, next| {
-                        assert!(match next {
-                            Next::Piece(next) => next.abs_diff(i) == 1 && next < pieces,
-                            Next::First | Next::Last => true,
-                        });
-                        counts[i].fetch_add(1, Ordering::Relaxed);
-                    });
-                    assert!(counts.iter().all(|c| c.load(Ordering::Relaxed) == 1));
-                }
-                pool.end();
-            }
-        }
-    }
-
-    #[test]
-    fn both_threads_work() {
-        let mut pool = Pool::new(2).unwrap();
-        pool.begin();
-        let caller = thread::current().id();
-        let helped = AtomicBool::new(false);
-        // Ends when the helper has taken a piece; the caller's pieces wait for that.
-        pool.run(2, &|_, _| {
-            if thread::current().id() == caller {
-                while !helped.load(Ordering::Acquire) {
-                    thread::yield_now();
-                }
-            } else {
-                helped.store(true, Ordering::Release);
-            }
-        });
-        assert!(helped.load(Ordering::Acquire));
-    }
-
-    #[test]
-    fn the_helper_is_known_and_can_be_pinned() {
-        let (one, two) = (Pool::new(1).unwrap(), Pool::new(2).unwrap());
-        assert_eq!(one.helper_id(), None);
-        assert!(one.pin_helper(0).is_ok(), "there is nobody to pin");
-        if cfg!(target_os = "linux") {
-            assert!(two.helper_id().is_some_and(|id| Some(id) != current_thread_id()));
-            two.pin_helper(u64::MAX).unwrap();
-            assert!(two.pin_helper(0).is_err());
-        }
-    }
-
-    #[test]
-    fn panics_come_out_and_the_pool_lives_on() {
-        let mut pool = Pool::new(2).unwrap();
-        pool.begin();
-        for bad in 0..20 {
-            let outcome = catch_unwind(AssertUnwindSafe(|| {
-                pool.run(20, &|i, _| assert!(i != bad, "piece {i}"));
-            }));
-            let message = *outcome.unwrap_err().downcast::<String>().unwrap();
-            assert_eq!(message, format!("piece {bad}"));
-        }
-        let sum = AtomicUsize::new(0);
-        pool.run(20, &|i, _| {
-            sum.fetch_add(i, Ordering::Relaxed);
-        });
-        assert_eq!(sum.into_inner(), 190);
     }
 }

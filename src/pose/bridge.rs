@@ -1,19 +1,23 @@
-//! Borders between blocks: motion goes on as it was going and comes over to what the new block says.
+//! Borders between blocks: motion goes on as it was going and comes over to what the new block
+//! says.
 //!
-//! Blocks are decoded one by one, and the first frames of a block need not continue the last frames of the one before. At each
-//! border the motion as decoded is taken one frame further, with the mean of the velocities before and after, and what the new
-//! block has there instead, in place and in the other half of the velocity, is the *difference*. It is added to the new block's frames and dies away as a critically damped spring lets it
-//! (inertialisation: Bollo 2018). What is left of earlier differences goes on over the border, nothing is dropped there; no frame waits for
+//! Blocks are decoded one by one, and the first frames of a block need not continue the last frames
+//! of the one before. At each border the motion as decoded is taken one frame further, with the
+//! mean of the velocities before and after, and what the new block has there instead, in place and
+//! in the other half of the velocity, is the *difference*. It is added to the new block's frames
+//! and dies away as a critically damped spring lets it (inertialisation: Bollo 2018). What is left
+//! of earlier differences goes on over the border, nothing is dropped there; no frame waits for
 //! another, and blocks that fit are not touched.
 //!
-//! Everything is relative to the parent joint: rotations, and the offset from the parent, which carries the bone's length. The
-//! root enters as its step, so that a body that moves keeps moving.
+//! Everything is relative to the parent joint: rotations, and the offset from the parent, which
+//! carries the bone's length. The root enters as its step, so that a body that moves keeps moving.
 
 use super::Rig;
 use crate::frame::Transform;
 use glam::{Quat, Vec3};
 
-/// No difference of a joint is taken for larger than this, radians: what is further off jumps by the rest.
+/// No difference of a joint is taken for larger than this, radians: what is further off jumps by
+/// the rest.
 const MAX_ANGLE: f32 = 1.5;
 
 /// A difference and its change a frame.
@@ -55,8 +59,8 @@ pub(super) struct Bridge {
 }
 
 impl Bridge {
-    /// For a rig; a difference dies away with the time constant `frames` (above 0): to 0.41 after twice as many frames, to
-    /// 0.09 after four times as many.
+    /// For a rig; a difference dies away with the time constant `frames` (above 0): to 0.41 after
+    /// twice as many frames, to 0.09 after four times as many.
     pub(super) fn new(rig: &Rig, frames: f32) -> Self {
         let rest = Link { turn: Quat::IDENTITY, offset: Vec3::ZERO };
         let joint = |parent| Joint { parent, decoded: [rest; 2], turn: Spring::default(), offset: Spring::default() };
@@ -78,8 +82,8 @@ impl Bridge {
         self.joints.iter_mut().for_each(|j| (j.turn, j.offset) = (Spring::default(), Spring::default()));
     }
 
-    /// A border: measures the difference to the new block, of which `first` and, if it has one, `second` are the joints in
-    /// their heading frames, and `step` is the root's first step.
+    /// A border: measures the difference to the new block, of which `first` and, if it has one,
+    /// `second` are the joints in their heading frames, and `step` is the root's first step.
     pub(super) fn start(&mut self, first: &[Transform], second: Option<&[Transform]>, step: [f32; 3]) {
         if self.known < 2 {
             return;
@@ -102,8 +106,8 @@ impl Bridge {
         self.steps.at += self.step - Vec3::from(step);
     }
 
-    /// The next frame of the block: adds what is left of the difference to `joints` (in the frame's heading frame) and to the
-    /// root's `step` to it.
+    /// The next frame of the block: adds what is left of the difference to `joints` (in the frame's
+    /// heading frame) and to the root's `step` to it.
     pub(super) fn apply(&mut self, joints: &mut [Transform], step: &mut [f32; 3]) {
         let (rate, keep) = (self.rate, self.keep);
         // Links first: parents are moved before their children.
@@ -155,8 +159,8 @@ fn link(parent: Option<usize>, j: usize, joints: &[Transform]) -> Link {
     }
 }
 
-/// Modified Rodrigues parameters, `axis tan(angle / 4)`: additive enough for differences below a right angle, and without
-/// functions that platforms round differently.
+/// Modified Rodrigues parameters, `axis tan(angle / 4)`: additive enough for differences below a
+/// right angle, and without functions that platforms round differently.
 fn parameters(q: Quat) -> Vec3 {
     let q = if q.w < 0.0 { -q } else { q };
     Vec3::new(q.x, q.y, q.z) / (1.0 + q.w)

@@ -73,7 +73,8 @@ fn what_is_left_at_a_border_is_carried_over_it() {
     // A jump at frame 8, and nothing new at the border of frame 12.
     let raw = arm(&rig, 24, |i| if i < 8 { 0.0 } else { 0.6 });
     let angles = angles(&rig, &bridged(&rig, &raw, |_| [0.0; 3]));
-    // The spring as one equation from frame 8 on; MRP and angle differ by the cube of a small angle.
+    // The spring as one equation from frame 8 on; MRP and angle differ by the cube of a small
+    // angle.
     for (i, angle) in angles.iter().enumerate().skip(8) {
         let t = (i - 8) as f32 / 1.5;
         let want = 0.6 - 0.6 * (1.0 + t) * (-t).exp();

@@ -5,9 +5,11 @@ use crate::frame::{JOINT_CHANNELS, ROOT_CHANNELS, Root, Transform, feature_count
 use crate::normaliser::Metric;
 use glam::Vec3;
 
-/// The root of a body whose hips are at `hips` (world): floor projection of the hips, heading of their +Z axis.
+/// The root of a body whose hips are at `hips` (world): floor projection of the hips, heading of
+/// their +Z axis.
 ///
-/// Hips whose +Z axis is upright (within 0.6 degrees) have no heading; they get `yaw`, best that of the frame before.
+/// Hips whose +Z axis is upright (within 0.6 degrees) have no heading; they get `yaw`, best that of
+/// the frame before.
 pub fn root_of(hips: &Transform, yaw: f64) -> Root {
     let z = hips.rotation * Vec3::Z;
     let upright = libm::hypotf(z.x, z.z) < 0.01;
@@ -17,7 +19,8 @@ pub fn root_of(hips: &Transform, yaw: f64) -> Root {
 
 /// The way back: world transforms of consecutive frames to feature vectors.
 ///
-/// With the roots that a [`Decoder`](super::Decoder) gave, it returns what the decoder was given, vertices made rigid.
+/// With the roots that a [`Decoder`](super::Decoder) gave, it returns what the decoder was given,
+/// vertices made rigid.
 #[derive(Debug, Clone)]
 pub struct Encoder {
     radius: f32,
@@ -25,7 +28,8 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// An encoder with icosahedra of circumradius `radius`, metres. Its first frame has root channels 0.
+    /// An encoder with icosahedra of circumradius `radius`, metres. Its first frame has root
+    /// channels 0.
     pub fn new(radius: f32) -> Self {
         Self { radius, previous: None }
     }
@@ -36,7 +40,8 @@ impl Encoder {
     }
 
     /// Writes the feature vector of the next frame, whose root is `root` ([`root_of`], or
-    /// [`Frame::root`](crate::frame::Frame::root)) and whose joints stand at `global` (world, J of them), to `x`.
+    /// [`Frame::root`](crate::frame::Frame::root)) and whose joints stand at `global` (world, J of
+    /// them), to `x`.
     ///
     /// # Panics
     /// If `x` is not `3 + 36 J` long.

@@ -13,16 +13,20 @@ use crate::normaliser::Metric;
 use crate::par::Pool;
 use glam::{Mat3, Quat};
 
-/// Joints that one thread makes transforms of at a time: as many as go through the polar factors side by side, twice.
+/// Joints that one thread makes transforms of at a time: as many as go through the polar factors
+/// side by side, twice.
 const LOT: usize = 32;
 
-/// Streaming decoder of feature vectors: integrates the root, places the joints in the world and fits the rig.
+/// Streaming decoder of feature vectors: integrates the root, places the joints in the world and
+/// fits the rig.
 ///
-/// A feature vector `x` holds `F = 3 + 36 J` values: `(vx, vz)` the root's displacement since the frame
-/// before in that frame's heading frame (m/frame), `dyaw` the turn (rad/frame), then for each joint the 12 vertices of its
-/// icosahedron ([`super::icosahedron`]) in *this* frame's heading frame (origin: the root on the floor; +Z: the heading).
+/// A feature vector `x` holds `F = 3 + 36 J` values: `(vx, vz)` the root's displacement since the
+/// frame before in that frame's heading frame (m/frame), `dyaw` the turn (rad/frame), then for each
+/// joint the 12 vertices of its icosahedron ([`super::icosahedron`]) in *this* frame's heading
+/// frame (origin: the root on the floor; +Z: the heading).
 ///
-/// Decoding allocates nothing, provided that the frame's buffers have room for J joints ([`Frame::empty`]).
+/// Decoding allocates nothing, provided that the frame's buffers have room for J joints
+/// ([`Frame::empty`]).
 #[derive(Debug, Clone)]
 pub struct Decoder {
     radius: f32,
@@ -34,7 +38,8 @@ pub struct Decoder {
     /// Whether poses are judged; else the guard only holds.
     guarded: bool,
     kernels: Kernels,
-    /// Joints of a block's frames, each frame's in its heading frame, `[4, J]`, and a rest up to whole lots.
+    /// Joints of a block's frames, each frame's in its heading frame, `[4, J]`, and a rest up to
+    /// whole lots.
     joints: Vec<Transform>,
     /// The root's step to each of them, and the root.
     steps: [[f32; ROOT_CHANNELS]; BLOCK_FRAMES],
@@ -46,7 +51,8 @@ pub struct Decoder {
 }
 
 impl Decoder {
-    /// A decoder for `rig` and icosahedra of circumradius `radius` (metres), with the root at the origin facing +Z.
+    /// A decoder for `rig` and icosahedra of circumradius `radius` (metres), with the root at the
+    /// origin facing +Z.
     pub fn new(kernels: Kernels, rig: &Rig, radius: f32) -> Self {
         let n = rig.len();
         Self {
@@ -66,7 +72,8 @@ impl Decoder {
         }
     }
 
-    /// The same with borders between blocks bridged (`bridge.rs`): a difference dies away with the time constant `frames`.
+    /// The same with borders between blocks bridged (`bridge.rs`): a difference dies away with the
+    /// time constant `frames`.
     #[must_use]
     pub fn with_bridge(mut self, rig: &Rig, frames: f32) -> Self {
         self.bridge = Some(Bridge::new(rig, frames));
@@ -80,7 +87,8 @@ impl Decoder {
         self
     }
 
-    /// The same with frames that no body could show replaced (`guard.rs`); decoding then never fails.
+    /// The same with frames that no body could show replaced (`guard.rs`); decoding then never
+    /// fails.
     #[must_use]
     pub fn with_guard(mut self) -> Self {
         self.guarded = true;
@@ -112,8 +120,8 @@ impl Decoder {
         self.previous.fill(Quat::IDENTITY);
     }
 
-    /// Takes the pose of `x`, one feature vector, for the one before the first frame: it is held where the first one is not
-    /// plausible.
+    /// Takes the pose of `x`, one feature vector, for the one before the first frame: it is held
+    /// where the first one is not plausible.
     ///
     /// # Panics
     /// If `x` is not F long.
@@ -124,8 +132,8 @@ impl Decoder {
         self.guard.prime(&self.joints[..self.previous.len()]);
     }
 
-    /// Decodes the next frame: advances the root and fills `root`, `global`, `hips`, `local`, `fit_error` and `held` of
-    /// `frame`; its other fields are left alone.
+    /// Decodes the next frame: advances the root and fills `root`, `global`, `hips`, `local`,
+    /// `fit_error` and `held` of `frame`; its other fields are left alone.
     ///
     /// # Errors
     /// As [`Decoder::decode_block`].
@@ -137,13 +145,13 @@ impl Decoder {
         self.decode_block(x, std::slice::from_mut(frame))
     }
 
-    /// Decodes the next block of up to four frames, `x` `[frames, F]`, as [`Decoder::decode`] does one. Between the features and the
-    /// frames, in this order: what is not plausible is replaced, the border to the block before is bridged, then planted feet are
-    /// held.
+    /// Decodes the next block of up to four frames, `x` `[frames, F]`, as [`Decoder::decode`] does
+    /// one. Between the features and the frames, in this order: what is not plausible is replaced,
+    /// the border to the block before is bridged, then planted feet are held.
     ///
     /// # Errors
-    /// [`ErrorKind::State`] if a value of `x` is not finite and there is no guard; the decoder is then as before and `frames`
-    /// untouched.
+    /// [`ErrorKind::State`] if a value of `x` is not finite and there is no guard; the decoder is
+    /// then as before and `frames` untouched.
     ///
     /// # Panics
     /// If there are more than four frames, or `x` does not have as many vectors of length F.
@@ -152,7 +160,8 @@ impl Decoder {
         self.decode_block_on(None, x, frames)
     }
 
-    /// The same on the threads of `pool`, as far as frames do not depend on each other; with the same bits.
+    /// The same on the threads of `pool`, as far as frames do not depend on each other; with the
+    /// same bits.
     ///
     /// # Errors
     /// As [`Decoder::decode_block`].
@@ -185,7 +194,8 @@ impl Decoder {
         Ok(())
     }
 
-    /// Up to four frames for which there are no usable features: the guard treats them as it does features that are not finite.
+    /// Up to four frames for which there are no usable features: the guard treats them as it does
+    /// features that are not finite.
     ///
     /// # Panics
     /// If there are more than four frames, or no guard.
@@ -198,8 +208,8 @@ impl Decoder {
         self.show(pool, frames);
     }
 
-    /// Up to four frames without features: motion eases into a held, breathing pose. Decoding goes on from there in a
-    /// cross-fade, as if there had been no time between.
+    /// Up to four frames without features: motion eases into a held, breathing pose. Decoding goes
+    /// on from there in a cross-fade, as if there had been no time between.
     ///
     /// # Panics
     /// If there are more than four frames.
@@ -289,7 +299,8 @@ impl Decoder {
     }
 }
 
-/// Calls `work` for each of `items` with one of the `tools`, on the threads of `pool` if there is one.
+/// Calls `work` for each of `items` with one of the `tools`, on the threads of `pool` if there is
+/// one.
 fn each<S: Send, T: Send>(
     pool: Option<&mut Pool>,
     tools: &mut [S; 2],
@@ -302,7 +313,8 @@ fn each<S: Send, T: Send>(
     }
 }
 
-/// Writes `joints`, in the heading frame of `root`, to `frame` as world transforms, but for the signs of the rotations.
+/// Writes `joints`, in the heading frame of `root`, to `frame` as world transforms, but for the
+/// signs of the rotations.
 fn place(joints: &[Transform], root: &Root, frame: &mut Frame) {
     let heading = root.rotation();
     frame.root = *root;

@@ -1,28 +1,31 @@
 //! Local rotations on the rig's fixed bone lengths from decoded joint transforms.
 //!
-//! Decoded positions do not keep bone lengths exactly. Going from the hips outwards, each joint is turned so that what it
-//! carries comes as near as possible to the decoded positions, seen from where the *fitted* joint is, so that the error of
-//! one bone does not move the next:
+//! Decoded positions do not keep bone lengths exactly. Going from the hips outwards, each joint is
+//! turned so that what it carries comes as near as possible to the decoded positions, seen from
+//! where the *fitted* joint is, so that the error of one bone does not move the next:
 //!
 //! - a joint without children keeps its decoded rotation;
-//! - with one child, it is the decoded rotation swung by the shortest arc that points the bone at the child: twist from the
-//!   rotation, direction from the position;
-//! - with several children, it is the least-squares rotation over the children and the decoded rotation
-//!   ([`ROTATION_WEIGHT`]);
-//! - the upper bone of a limb is swung at a point that trades the elbow's (knee's) error against the hand's (foot's), see
-//!   [`limb_target`]: the end of a limb is what one sees, and what stands on the floor.
+//! - with one child, it is the decoded rotation swung by the shortest arc that points the bone at
+//!   the child: twist from the rotation, direction from the position;
+//! - with several children, it is the least-squares rotation over the children and the decoded
+//!   rotation ([`ROTATION_WEIGHT`]);
+//! - the upper bone of a limb is swung at a point that trades the elbow's (knee's) error against
+//!   the hand's (foot's), see [`limb_target`]: the end of a limb is what one sees, and what stands
+//!   on the floor.
 
 use super::Rig;
 use crate::frame::{Frame, Root, Transform};
 use crate::kernels::Kernels;
 use glam::{Mat3, Quat, Vec3};
 
-/// Weight of a decoded rotation against a child's position (1) in the least squares of a joint with several children, m^2:
-/// that of the 12 vertices of an icosahedron of radius 0.1 m: `sum_v |r v|^2 / (3 * 12)`.
+/// Weight of a decoded rotation against a child's position (1) in the least squares of a joint with
+/// several children, m^2: that of the 12 vertices of an icosahedron of radius 0.1 m: `sum_v |r v|^2
+/// / (3 * 12)`.
 const ROTATION_WEIGHT: f32 = 4.0 * 0.1 * 0.1 / 12.0;
-/// Weight of the squared error of a limb's end against that of its middle joint. At this weight a limb that was decoded
-/// too short is only bent out of the straight line when the shortfall exceeds about `l / (2 w)`, 2 cm for a leg. With 2 % of
-/// noise, hands and feet are off by 2.2 mm on average at 10, by 6.6 mm at 0 and 1.6 mm at 20, where elbows lose more.
+/// Weight of the squared error of a limb's end against that of its middle joint. At this weight a
+/// limb that was decoded too short is only bent out of the straight line when the shortfall exceeds
+/// about `l / (2 w)`, 2 cm for a leg. With 2 % of noise, hands and feet are off by 2.2 mm on
+/// average at 10, by 6.6 mm at 0 and 1.6 mm at 20, where elbows lose more.
 const END_WEIGHT: f32 = 10.0;
 /// Gauss-Newton steps of [`limb_target`]; it moves by less than 1e-6 rad after 5.
 const LIMB_STEPS: usize = 6;
@@ -35,7 +38,8 @@ enum Plan {
     Limb { middle: usize, end: usize },
 }
 
-/// Fits the rig to decoded transforms; streaming, because quaternion signs follow the frame before. Allocates nothing.
+/// Fits the rig to decoded transforms; streaming, because quaternion signs follow the frame before.
+/// Allocates nothing.
 #[derive(Debug, Clone)]
 pub struct Fit {
     kernels: Kernels,
@@ -64,9 +68,10 @@ impl Fit {
         self.previous.fill(Quat::IDENTITY);
     }
 
-    /// Fits the rig to `joints` (J transforms in the heading frame of `root`; with `Root::default()` in the world) and
-    /// fills `hips`, `local` and `fit_error` of `frame`, but for the signs of rotations, which depend on the frame before
-    /// ([`Fit::sign`]). The hips are where they were decoded. `placed` is scratch for J transforms.
+    /// Fits the rig to `joints` (J transforms in the heading frame of `root`; with
+    /// `Root::default()` in the world) and fills `hips`, `local` and `fit_error` of `frame`, but
+    /// for the signs of rotations, which depend on the frame before ([`Fit::sign`]). The hips are
+    /// where they were decoded. `placed` is scratch for J transforms.
     pub(super) fn turn(&self, placed: &mut [Transform], joints: &[Transform], root: &Root, frame: &mut Frame) {
         assert_eq!(joints.len(), self.plans.len(), "one transform a joint");
         frame.local.resize(joints.len(), Quat::IDENTITY);
@@ -137,7 +142,8 @@ fn plan(rig: &Rig, j: usize) -> Plan {
     }
 }
 
-/// Gives each of `rotations` the sign that is nearer to its rotation in `previous`, which it replaces.
+/// Gives each of `rotations` the sign that is nearer to its rotation in `previous`, which it
+/// replaces.
 pub(super) fn follow<'a>(previous: &mut [Quat], rotations: impl Iterator<Item = &'a mut Quat>) {
     for (q, previous) in rotations.zip(previous) {
         *q = if q.dot(*previous) < 0.0 { -*q } else { *q };
@@ -145,7 +151,8 @@ pub(super) fn follow<'a>(previous: &mut [Quat], rotations: impl Iterator<Item = 
     }
 }
 
-/// The shortest rotation that turns the direction of `from` into that of `to`; none where one of them has no direction.
+/// The shortest rotation that turns the direction of `from` into that of `to`; none where one of
+/// them has no direction.
 pub(super) fn swing(from: Vec3, to: Vec3) -> Quat {
     let (from, to) = match (from.try_normalize(), to.try_normalize()) {
         (Some(from), Some(to)) => (from, to),
@@ -159,13 +166,14 @@ pub(super) fn swing(from: Vec3, to: Vec3) -> Quat {
     Quat::from_xyzw(v.x, v.y, v.z, w).normalize()
 }
 
-/// Where to point the upper bone of a limb, from its joint: the place `e` of the middle joint, at the bone's length, that
-/// minimises `l1^2 angle(e, middle)^2 + END_WEIGHT (|end - e| - l2)^2`.
+/// Where to point the upper bone of a limb, from its joint: the place `e` of the middle joint, at
+/// the bone's length, that minimises `l1^2 angle(e, middle)^2 + END_WEIGHT (|end - e| - l2)^2`.
 ///
-/// The second term is the error of the limb's end once the lower bone points at `end`. By symmetry the optimum lies in the
-/// plane of the three decoded joints, so it is one angle `t` from the line to the end, found by Gauss-Newton. A limb that
-/// is nearly straight has no leverage (`d'` is small), so it is not bent to hide a centimetre, and a limb without a plane
-/// (straight) is pointed as decoded; both are continuous in the input.
+/// The second term is the error of the limb's end once the lower bone points at `end`. By symmetry
+/// the optimum lies in the plane of the three decoded joints, so it is one angle `t` from the line
+/// to the end, found by Gauss-Newton. A limb that is nearly straight has no leverage (`d'` is
+/// small), so it is not bent to hide a centimetre, and a limb without a plane (straight) is pointed
+/// as decoded; both are continuous in the input.
 fn limb_target(middle: Vec3, end: Vec3, (l1, l2): (f32, f32)) -> Vec3 {
     let far = end.length();
     let Some(u) = end.try_normalize() else { return middle };

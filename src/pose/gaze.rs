@@ -4,12 +4,12 @@ use super::Rig;
 use crate::frame::Transform;
 use glam::Vec3;
 
-/// How much the head is turned towards the user: `g = unit(h_f - h_b) . unit(user - h_b)` with `h_f` the eyes' midpoint
-/// and `h_b` the back of the head (SARAH 3.4), in three dimensions.
+/// How much the head is turned towards the user: `g = unit(h_f - h_b) . unit(user - h_b)` with
+/// `h_f` the eyes' midpoint and `h_b` the back of the head (SARAH 3.4), in three dimensions.
 ///
-/// `head` is the head joint's transform and `user` the user's head, both in the same frame, metres. 1: faced, 0: at a
-/// right angle, -1: turned away. `None` where there is no direction: the user's head within 1 mm of `h_b`, or a value
-/// that is not finite.
+/// `head` is the head joint's transform and `user` the user's head, both in the same frame, metres.
+/// 1: faced, 0: at a right angle, -1: turned away. `None` where there is no direction: the user's
+/// head within 1 mm of `h_b`, or a value that is not finite.
 pub fn gaze_score(rig: &Rig, head: &Transform, user: Vec3) -> Option<f32> {
     let (front, back) = rig.head_points(head);
     let to_user = user - back;

@@ -1,15 +1,16 @@
 //! Plausibility: what no human body can do is not shown.
 //!
-//! A bundle may be damaged, a weight may have been flipped, arithmetic may overflow: the decoder then gives numbers that are
-//! not finite, or joints that fly. The guard stands between the decoded pose and what is made of it. Where a frame is
-//! not plausible it goes on from the last frames it showed, eased into a held, breathing pose, and comes back in a cross-fade when
-//! four plausible frames have followed each other. A session that must pause is held by the same means.
+//! A bundle may be damaged, a weight may have been flipped, arithmetic may overflow: the decoder
+//! then gives numbers that are not finite, or joints that fly. The guard stands between the decoded
+//! pose and what is made of it. Where a frame is not plausible it goes on from the last frames it
+//! showed, eased into a held, breathing pose, and comes back in a cross-fade when four plausible
+//! frames have followed each other. A session that must pause is held by the same means.
 //!
 //! | bound | value | why |
 //! |---|---|---|
 //! | [`MAX_JOINT_SPEED`] | 12 m/s, as seen from the body | an Olympic boxer's fist: 9.1 m/s, standard deviation 2.1 (Walilko, Viano and Bir 2005) |
 //! | [`MAX_ROOT_SPEED`] | 11 m/s | a sprinter's record: 12.4 m/s; what [`super::Decoder`] corrects for planted feet comes on top, 0.8 m/s at most |
-//! | [`MAX_TURN_SPEED`] | 15 rad/s | more than two turns a second |
+//! | [`MAX_TURN_SPEED`] | 15 rad/s | more than two turns per second |
 //! | reach | 1.5 x the rig's longest chain of bones | from the point below the hips |
 
 use super::Rig;
@@ -25,8 +26,8 @@ pub const MAX_TURN_SPEED: f32 = 15.0;
 
 /// A bundle that trips the guard more often than this is defective, trips a minute of motion.
 pub const DEFECTIVE_TRIPS_A_MINUTE: f64 = 1.0;
-/// A bundle is defective as well when more than this part of its motion is held: one that is never plausible trips once and stays
-/// held. A trip holds 12 frames at least, 0.7 % of a minute.
+/// A bundle is defective as well when more than this part of its motion is held: one that is never
+/// plausible trips once and stays held. A trip holds 12 frames at least, 0.7 % of a minute.
 pub const DEFECTIVE_HELD: f64 = 0.02;
 
 /// Frames of a cross-fade back to decoded poses.
@@ -39,7 +40,7 @@ const EASE: f32 = 0.7;
 const EASE_SPEED: f32 = 2.0 / FPS as f32;
 /// Pitch of the chest in a breath, radians: 4 mm at the height of the head.
 const BREATH: f32 = 0.012;
-/// Frames of a breath, 15 a minute.
+/// Frames of a breath, 15 per minute.
 const BREATH_FRAMES: u32 = 4 * FPS;
 
 /// What the guard met.
@@ -58,7 +59,8 @@ pub struct GuardStats {
 }
 
 impl GuardStats {
-    /// Whether `frames` frames of motion that were guarded like this come from a defective bundle. One trip is forgiven.
+    /// Whether `frames` frames of motion that were guarded like this come from a defective bundle.
+    /// One trip is forgiven.
     pub fn is_defective(&self, frames: u64) -> bool {
         let minutes = frames as f64 / (60.0 * f64::from(FPS));
         self.trips as f64 > (DEFECTIVE_TRIPS_A_MINUTE * minutes).max(1.0)
@@ -85,17 +87,20 @@ struct Verdict {
     steady: bool,
 }
 
-/// Judges poses and replaces them where they are not plausible. Streaming; allocates nothing once made.
+/// Judges poses and replaces them where they are not plausible. Streaming; allocates nothing once
+/// made.
 #[derive(Debug, Clone)]
 pub(super) struct Guard {
     reach: f32,
-    /// The joint that breathes and those that it carries; the joint that keeps the head still and those that it carries.
+    /// The joint that breathes and those that it carries; the joint that keeps the head still and
+    /// those that it carries.
     chest: Option<(usize, Vec<bool>)>,
     neck: Option<(usize, Vec<bool>)>,
     state: State,
     /// Whether it holds, or fades back, because it was asked to.
     paused: bool,
-    /// Shown last, in its heading frame, without the breath, and how it changed from the frame before.
+    /// Shown last, in its heading frame, without the breath, and how it changed from the frame
+    /// before.
     shown: Vec<Transform>,
     speed: Vec<Transform>,
     step: [f32; 3],
@@ -155,14 +160,15 @@ impl Guard {
         self.stats
     }
 
-    /// Judges the next frame: `joints` in its heading frame and the root's `step` to it; replaces them where that is needed.
-    /// Returns how much of the frame is held, 0 to 1.
+    /// Judges the next frame: `joints` in its heading frame and the root's `step` to it; replaces
+    /// them where that is needed. Returns how much of the frame is held, 0 to 1.
     pub(super) fn check(&mut self, joints: &mut [Transform], step: &mut [f32; 3]) -> f32 {
         let verdict = self.judge(joints, *step);
         self.answer(verdict, joints, step)
     }
 
-    /// The next frame, of which nothing usable is known; what `joints` and `step` hold is not looked at.
+    /// The next frame, of which nothing usable is known; what `joints` and `step` hold is not
+    /// looked at.
     pub(super) fn miss(&mut self, joints: &mut [Transform], step: &mut [f32; 3]) -> f32 {
         self.answer(Verdict { finite: false, plausible: false, steady: false }, joints, step)
     }

@@ -38,7 +38,8 @@ fn fling(x: &mut [f32], j: usize, by: Vec3) {
     vertices.iter_mut().for_each(|v| *v = (Vec3::from(*v) + by).to_array());
 }
 
-/// Largest step of a joint and of the root in the world from one frame to the next, metres; everything must be finite.
+/// Largest step of a joint and of the root in the world from one frame to the next, metres;
+/// everything must be finite.
 fn largest_step(frames: &[Frame]) -> f32 {
     let step = |w: &[Frame]| {
         assert!(w[1].global.iter().all(finite) && w[1].local.iter().all(|q| q.is_finite()) && w[1].hips.is_finite());
@@ -57,7 +58,8 @@ fn motion_of_a_body_is_not_touched() {
     assert_eq!(guarded.guard_stats(), GuardStats::default());
 }
 
-/// A few frames of rubbish, of every kind: no joint goes further in a frame than it does without, but for the cross-fade.
+/// A few frames of rubbish, of every kind: no joint goes further in a frame than it does without,
+/// but for the cross-fade.
 #[test]
 fn rubbish_is_held_and_faded_over() {
     let (rig, features) = walk(300);
@@ -86,7 +88,8 @@ fn rubbish_is_held_and_faded_over() {
     }
 }
 
-/// Rubbish from the first frame on: the pose before it is held, or the rig at rest where there is none.
+/// Rubbish from the first frame on: the pose before it is held, or the rig at rest where there is
+/// none.
 #[test]
 fn rubbish_for_ever_is_a_breathing_pose() {
     let (rig, features) = walk(5);
@@ -109,7 +112,8 @@ fn rubbish_for_ever_is_a_breathing_pose() {
     }
 }
 
-/// No features at all are answered as features without a number are, bit for bit, wherever they come.
+/// No features at all are answered as features without a number are, bit for bit, wherever they
+/// come.
 #[test]
 fn a_missing_block_is_a_block_of_rubbish() {
     let (rig, features) = walk(120);
@@ -140,7 +144,8 @@ fn a_limb_that_stays_out_of_reach_is_never_shown() {
     assert!(frames[50..].iter().all(|f| f.held == 1.0));
 }
 
-/// A pause of any length: motion slows down within half a second and comes back from where it was decoded last.
+/// A pause of any length: motion slows down within half a second and comes back from where it was
+/// decoded last.
 #[test]
 fn a_pause_eases_out_and_fades_in() {
     let (rig, features) = walk(260);

@@ -8,8 +8,8 @@ pub const VERTICES: usize = 12;
 
 /// Vertices of the reference icosahedron: unit circumradius, centred, `sum_v v v^T = 4 I`.
 ///
-/// Order: for each `(a, b)` of `(1, phi), (1, -phi), (-1, phi), (-1, -phi)`: `(0, a, b)`, `(a, b, 0)`, `(b, 0, a)`, each
-/// over `sqrt(1 + phi^2)`.
+/// Order: for each `(a, b)` of `(1, phi), (1, -phi), (-1, phi), (-1, -phi)`: `(0, a, b)`, `(a, b,
+/// 0)`, `(b, 0, a)`, each over `sqrt(1 + phi^2)`.
 pub const REFERENCE: [Vec3; VERTICES] = reference();
 
 const fn reference() -> [Vec3; VERTICES] {
@@ -38,10 +38,12 @@ pub fn encode(joint: &Transform, radius: f32, out: &mut [f32; JOINT_CHANNELS]) {
     }
 }
 
-/// The joint's position, metres, and the least-squares linear map `A` from the reference to `vertices`, row-major.
+/// The joint's position, metres, and the least-squares linear map `A` from the reference to
+/// `vertices`, row-major.
 ///
-/// `p` is the centroid; because the reference is isotropic, `A = 1 / (4 radius) sum_v (X_v - p) REFERENCE[v]^T`. Vertices
-/// that [`encode`] wrote give the joint's rotation; others have its polar factor taken.
+/// `p` is the centroid; because the reference is isotropic, `A = 1 / (4 radius) sum_v (X_v - p)
+/// REFERENCE[v]^T`. Vertices that [`encode`] wrote give the joint's rotation; others have its polar
+/// factor taken.
 pub fn decode(vertices: &[f32; JOINT_CHANNELS], radius: f32) -> (Vec3, [f32; 9]) {
     let vertex = |v: usize| Vec3::from_slice(&vertices[3 * v..3 * v + 3]);
     let position = (0..VERTICES).map(vertex).sum::<Vec3>() / VERTICES as f32;

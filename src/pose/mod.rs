@@ -1,9 +1,10 @@
 //! Poses: the rig, icosahedra, and the way between feature vectors and joint transforms.
 //!
 //! A pose enters as one feature vector `x` of `3 + 36 J` values (see [`Decoder`]), becomes a world
-//! transform of each joint ([`crate::frame::Frame::global`]) and, because decoded joints do not keep bone lengths
-//! exactly, a rotation of each joint on the rig that does ([`Fit`], [`crate::frame::Frame::local`]). The difference is
-//! reported in [`crate::frame::Frame::fit_error`]. [`Encoder`] is the way back.
+//! transform of each joint ([`crate::frame::Frame::global`]) and, because decoded joints do not
+//! keep bone lengths exactly, a rotation of each joint on the rig that does ([`Fit`],
+//! [`crate::frame::Frame::local`]). The difference is reported in
+//! [`crate::frame::Frame::fit_error`]. [`Encoder`] is the way back.
 //!
 //! Everything is right-handed, metres, Y up; nothing here allocates once it is built.
 

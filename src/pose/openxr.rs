@@ -1,14 +1,16 @@
 //! Joints of OpenXR's body tracking extensions and of the VRM humanoid, to and fro.
 //!
-//! `XR_FB_body_tracking` has 70 joints (`XrBodyJointFB`): spine, arms, and both hands to the finger tips;
-//! `XR_META_body_tracking_full_body` has the same and 14 more of the legs (`XrFullBodyJointMETA`). Index `i` of [`OPENXR_JOINTS`] is the
-//! extension's own number, its name without prefix and suffix (`HIPS` for `XR_BODY_JOINT_HIPS_FB`).
+//! `XR_FB_body_tracking` has 70 joints (`XrBodyJointFB`): spine, arms, and both hands to the finger
+//! tips; `XR_META_body_tracking_full_body` has the same and 14 more of the legs
+//! (`XrFullBodyJointMETA`). Index `i` of [`OPENXR_JOINTS`] is the extension's own number, its name
+//! without prefix and suffix (`HIPS` for `XR_BODY_JOINT_HIPS_FB`).
 
 /// Joints of `XR_FB_body_tracking`: the first of [`OPENXR_JOINTS`].
 pub const FB_BODY_JOINTS: usize = 70;
 
-/// Joints of `XR_META_body_tracking_full_body`, and the VRM joint whose transform each follows: its own, or the nearest one towards
-/// the hips (palms and fingers follow the hand). `ROOT` follows none: it is the agent's place on the floor.
+/// Joints of `XR_META_body_tracking_full_body`, and the VRM joint whose transform each follows: its
+/// own, or the nearest one towards the hips (palms and fingers follow the hand). `ROOT` follows
+/// none: it is the agent's place on the floor.
 pub const OPENXR_JOINTS: [(&str, Option<&str>); 84] = [
     ("ROOT", None),
     ("HIPS", Some("hips")),
@@ -96,8 +98,9 @@ pub const OPENXR_JOINTS: [(&str, Option<&str>); 84] = [
     ("RIGHT_FOOT_BALL", Some("rightToes")),
 ];
 
-/// The OpenXR joint that stands for the VRM joint `name`; `None` for a joint that has no counterpart. Leg joints have numbers from 70
-/// on and exist in `XR_META_body_tracking_full_body` only.
+/// The OpenXR joint that stands for the VRM joint `name`; `None` for a joint that has no
+/// counterpart. Leg joints have numbers from 70 on and exist in `XR_META_body_tracking_full_body`
+/// only.
 pub fn openxr_joint(name: &str) -> Option<usize> {
     let (side, joint) = match name.strip_prefix("left") {
         Some(joint) => (0, joint),

@@ -20,8 +20,8 @@ const CIRCLE: f64 = 2.0;
 /// Walking speed, m/s.
 const SPEED: f64 = 1.0;
 
-/// `frames` frames of walking on the reference rig; bone lengths exact, `global` = kinematics of `local`. The user walks
-/// ahead and is not seen in frames 0 to 9 and 40 to 49.
+/// `frames` frames of walking on the reference rig; bone lengths exact, `global` = kinematics of
+/// `local`. The user walks ahead and is not seen in frames 0 to 9 and 40 to 49.
 pub fn walk(frames: usize) -> Walk {
     let rig = Rig::humanoid();
     let user = |i: usize| {
@@ -98,7 +98,8 @@ impl Noise {
         ((z ^ (z >> 31)) >> 40) as f32 / (1 << 23) as f32 - 1.0
     }
 
-    /// Three independent values of mean 0 and standard deviation 1, at most sqrt(12) each (the sum of four uniform ones).
+    /// Three independent values of mean 0 and standard deviation 1, at most sqrt(12) each (the sum
+    /// of four uniform ones).
     pub fn vector(&mut self) -> Vec3 {
         let mut value = || (0..4).map(|_| self.next()).sum::<f32>() * (3.0f32 / 4.0).sqrt();
         Vec3::new(value(), value(), value())

@@ -26,7 +26,7 @@ impl Calibration {
         let mut activations = Some(Activations::moments_of(EVERY));
         Teacher::new(reference, scene.clone(), Sampler::Midpoint4, 0, &mut activations)?;
         if reference.config().student.is_some() {
-            // One call a block: each counts. The other networks' inputs are the same kind again.
+            // One call per block: each counts. The other networks' inputs are the same kind again.
             if let Some(a) = &mut activations {
                 a.set_every(1);
             }

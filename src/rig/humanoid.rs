@@ -31,8 +31,8 @@ const JOINTS: [Row; 22] = [
 ];
 
 impl Rig {
-    /// The reference rig: the 22 joints of the VRM humanoid that bundles use, an adult of about 1.70 m in T-pose on the
-    /// floor, facing +Z, left on +X.
+    /// The reference rig: the 22 joints of the VRM humanoid that bundles use, an adult of about
+    /// 1.70 m in T-pose on the floor, facing +Z, left on +X.
     pub fn humanoid() -> Self {
         let joint = |&(name, parent, offset): &Row| Joint {
             name: name.to_owned(),

@@ -25,7 +25,8 @@ pub struct Joint {
     pub offset: [f32; 3],
 }
 
-/// The skeleton: joints with parents before children. At rest it stands in a T-pose facing +Z, all rotations identity.
+/// The skeleton: joints with parents before children. At rest it stands in a T-pose facing +Z, all
+/// rotations identity.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Rig {
     /// Joints, parents before children.
@@ -37,9 +38,9 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// Checks that the rig can be used: 1 to 256 joints, `hips` first and the only root, parents before
-    /// children, unique non-empty names, finite offsets of at most 3 m, a distance between `eyes` and `head_back`, and
-    /// the joints `hips`, `head`, both hands and both feet.
+    /// Checks that the rig can be used: 1 to 256 joints, `hips` first and the only root, parents
+    /// before children, unique non-empty names, finite offsets of at most 3 m, a distance between
+    /// `eyes` and `head_back`, and the joints `hips`, `head`, both hands and both feet.
     ///
     /// # Errors
     /// [`ErrorKind::BundleInvalid`] naming the joint and what is wrong with it.
@@ -112,8 +113,9 @@ impl Rig {
         self.joints.iter().enumerate().filter(move |(_, c)| c.parent == Some(j)).map(|(i, _)| i)
     }
 
-    /// Forward kinematics on the fixed bone lengths: `out[j]` is the transform of joint `j` in the frame of `hips` (the
-    /// hips' position, metres) and `local` (rotations relative to the parent, J of them).
+    /// Forward kinematics on the fixed bone lengths: `out[j]` is the transform of joint `j` in the
+    /// frame of `hips` (the hips' position, metres) and `local` (rotations relative to the parent,
+    /// J of them).
     ///
     /// # Panics
     /// If `local` or `out` is not J long.
@@ -131,7 +133,8 @@ impl Rig {
         }
     }
 
-    /// Where the eyes' midpoint (`h_f`) and the back of the head (`h_b`) are, given the head joint's transform.
+    /// Where the eyes' midpoint (`h_f`) and the back of the head (`h_b`) are, given the head
+    /// joint's transform.
     pub fn head_points(&self, head: &Transform) -> (Vec3, Vec3) {
         let place = |p: [f32; 3]| head.position + head.rotation * Vec3::from(p);
         (place(self.eyes), place(self.head_back))

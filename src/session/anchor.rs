@@ -6,13 +6,14 @@
 //! blocks, or when the agent has gone `radius` metres, the work is spread over the following
 //! blocks, a bounded piece each:
 //!
-//! 1. *encode*: the encoder runs through the decoded frames of the last flow window, a few blocks at
-//!    a time, until it has caught up with the present;
+//! 1. *encode*: the encoder runs through the decoded frames of the last flow window, a few blocks
+//!    at a time, until it has caught up with the present;
 //! 2. *replace*: the new latents take the old ones' place in the history; slot caches are computed
 //!    anew, a few passes of eight tokens per block (what is still to come keeps the old latents'
 //!    keys, which describe the same motion);
 //! 3. *decode*: a second decoder state runs through the new latents until it has caught up; then
-//!    both decode the same latent once, and the four frames are cross-faded from the one to the other.
+//!    both decode the same latent once, and the four frames are cross-faded from the one to the
+//!    other.
 //!
 //! A block that has no time for its share gives the round up; a new one starts when there is time.
 

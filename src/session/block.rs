@@ -44,7 +44,7 @@ impl Block<'_> {
 
     /// The voices, to listen for it.
     pub(super) fn voices(&mut self) -> [Listening<'_>; 2] {
-        self.state.inputs.ears(self.state.block)
+        self.state.inputs.voice_inputs(self.state.block)
     }
 
     pub(super) fn generator(&mut self) -> &mut Generator {

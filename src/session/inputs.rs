@@ -5,7 +5,7 @@ use super::probe::{Probe, tell};
 use super::stats::{Delays, InputStats};
 #[cfg(feature = "tract")]
 use crate::audio::TractEncoder;
-use crate::audio::{AudioBackend, AudioEncoder, Voice};
+use crate::audio::{AudioBackend, AudioEncoder, Speaker, Voice, VoiceInput};
 use crate::config::Config;
 use crate::engine::Engine;
 use crate::error::Result;
@@ -13,11 +13,11 @@ use crate::flow::Condition;
 use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES, FPS, Root};
 use crate::kernels::Exec;
 use crate::session::SessionOptions;
-use crate::user::{HeadTrack, Presence, UserSample};
+use crate::user::{HeadInput, HeadTrack, Presence, UserSample};
 use glam::Vec3;
 
 /// A voice and the encoder that listens to it.
-pub(super) struct Ear {
+pub(super) struct EncodedVoice {
     voice: Voice,
     encoder: Hearing,
     samples: Box<[f32; BLOCK_SAMPLES]>,
@@ -69,14 +69,15 @@ impl Hearing {
 
 /// All inputs of a session.
 pub(super) struct Inputs {
-    agent: Ear,
-    user: Ear,
+    agent: EncodedVoice,
+    user: EncodedVoice,
+    head: HeadInput,
     track: HeadTrack,
     user_delay: u64,
     pub(super) condition: Condition,
 }
 
-impl Ear {
+impl EncodedVoice {
     fn new(engine: &Engine, options: &SessionOptions, delay: u32) -> Result<Self> {
         Ok(Self {
             voice: Voice::new(),
@@ -100,7 +101,8 @@ impl Ear {
         block.checked_sub(self.delay).filter(|known| *known >= self.first)
     }
 
-    /// Lets the sound that `block` may know go by unheard; the next that is heard starts a new signal.
+    /// Lets the sound that `block` may know go by unheard; the next that is heard starts a new
+    /// signal.
     fn skip(&mut self, block: u64) -> Result<()> {
         self.open = false;
         self.known(block).map_or(Ok(()), |known| self.voice.take_block(known, &mut self.samples).map(drop))
@@ -129,30 +131,32 @@ impl Ear {
 }
 
 /// A voice and the block that it listens for.
-pub(super) type Listening<'a> = Option<(u64, &'a mut Ear)>;
+pub(super) type Listening<'a> = Option<(u64, &'a mut EncodedVoice)>;
 
-/// Lets all of `ears`, of any sessions, listen: side by side where more than one has something to hear.
-pub(super) fn listen(exec: &mut Exec, engine: &Engine, ears: &mut [Listening<'_>]) {
-    let hears = |(block, ear): &&(u64, &mut Ear)| ear.voice.is_present() && ear.known(*block).is_some();
-    let several = ears.iter().flatten().filter(hears).count() > 1;
-    let listen = |exec: &mut Exec, ear: &mut Listening<'_>| {
-        if let Some((block, ear)) = ear {
-            ear.heard = ear.listen(exec, engine, *block);
+/// Lets all of `inputs`, of any sessions, listen: side by side where more than one has something to
+/// hear.
+pub(super) fn listen(exec: &mut Exec, engine: &Engine, inputs: &mut [Listening<'_>]) {
+    let hears = |(block, input): &&(u64, &mut EncodedVoice)| input.voice.is_present() && input.known(*block).is_some();
+    let several = inputs.iter().flatten().filter(hears).count() > 1;
+    let listen = |exec: &mut Exec, input: &mut Listening<'_>| {
+        if let Some((block, input)) = input {
+            input.heard = input.listen(exec, engine, *block);
         }
     };
     if several {
-        exec.each(ears, listen);
+        exec.each(inputs, listen);
     } else {
         // One voice by itself has both threads in each of its layers.
-        ears.iter_mut().for_each(|ear| listen(exec, ear));
+        inputs.iter_mut().for_each(|input| listen(exec, input));
     }
 }
 
 impl Inputs {
     pub(super) fn new(engine: &Engine, options: &SessionOptions) -> Result<Self> {
         Ok(Self {
-            agent: Ear::new(engine, options, engine.config.agent_delay_blocks)?,
-            user: Ear::new(engine, options, engine.config.user_delay_blocks)?,
+            agent: EncodedVoice::new(engine, options, engine.config.agent_delay_blocks)?,
+            user: EncodedVoice::new(engine, options, engine.config.user_delay_blocks)?,
+            head: HeadInput::new(),
             track: HeadTrack::new(),
             user_delay: u64::from(engine.config.user_delay_blocks),
             condition: Condition::absent(engine.layout()),
@@ -163,6 +167,7 @@ impl Inputs {
     pub(super) fn reset(&mut self, first: u64) {
         self.agent.reset(first);
         self.user.reset(first);
+        self.head.reset();
         self.track.reset();
         self.condition.clear();
     }
@@ -173,31 +178,39 @@ impl Inputs {
         self.user.skip(block)
     }
 
-    pub(super) fn agent_voice(&mut self) -> &mut Voice {
-        &mut self.agent.voice
+    /// Takes notice of what was pushed since the last time: the coming blocks know that and no
+    /// more.
+    pub(super) fn look(&mut self) {
+        self.agent.voice.look();
+        self.user.voice.look();
+        self.head.drain(&mut self.track);
     }
 
-    pub(super) fn user_voice(&mut self) -> &mut Voice {
-        &mut self.user.voice
+    pub(super) fn voice(&self, speaker: Speaker) -> &VoiceInput {
+        match speaker {
+            Speaker::Agent => self.agent.voice.input(),
+            Speaker::User => self.user.voice.input(),
+        }
     }
 
-    pub(super) fn push_head(&mut self, position: Vec3, time: f64) {
-        self.track.push(position, time);
+    pub(super) fn head(&self) -> &HeadInput {
+        &self.head
     }
 
-    /// World position of the user's head in frame `frame`, as far as it is known at the start of its block.
+    /// World position of the user's head in frame `frame`, as far as it is known at the start of
+    /// its block.
     pub(super) fn head_at(&mut self, frame: u64) -> Option<Vec3> {
         let start = (frame - frame % BLOCK_FRAMES as u64) as f64 / f64::from(FPS);
         known(self.track.sample(frame as f64 / f64::from(FPS), start))
     }
 
     /// The voices, to [`listen`] for `block`.
-    pub(super) fn ears(&mut self, block: u64) -> [Listening<'_>; 2] {
+    pub(super) fn voice_inputs(&mut self, block: u64) -> [Listening<'_>; 2] {
         [Some((block, &mut self.agent)), Some((block, &mut self.user))]
     }
 
-    /// Makes the conditioning of `block`, for which voices have listened, with the agent's root at the end of the block
-    /// before.
+    /// Makes the conditioning of `block`, for which voices have listened, with the agent's root at
+    /// the end of the block before.
     pub(super) fn prepare(
         &mut self,
         block: u64,
@@ -224,8 +237,9 @@ impl Inputs {
         Ok(())
     }
 
-    /// Floor positions `(x, z)` of the user over the four frames that `block` may know, in the agent's frame; `None` when
-    /// the last of them is not known. Unknown earlier ones take the position that follows them.
+    /// Floor positions `(x, z)` of the user over the four frames that `block` may know, in the
+    /// agent's frame; `None` when the last of them is not known. Unknown earlier ones take the
+    /// position that follows them.
     fn user_in_agent_frame(&mut self, block: u64, root: &Root) -> Option<[f32; 8]> {
         let seen = block.checked_sub(self.user_delay).filter(|seen| *seen >= self.user.first)?;
         let now = (block * BLOCK_FRAMES as u64) as f64 / f64::from(FPS);
@@ -245,7 +259,7 @@ impl Inputs {
         InputStats {
             agent_voice: self.agent.voice.stats(),
             user_voice: self.user.voice.stats(),
-            head: self.track.stats(),
+            head: self.head.stats(&self.track),
         }
     }
 

@@ -9,6 +9,8 @@
 //! | `poll` | session time to blocks, starting anew |
 //! | `settings` | what may be set while it runs, and the governor's decisions |
 //! | `options` | what a session is made with |
+//! | `controls` | settings from other threads |
+//! | `shared` | a session, its inputs and its controls, for several threads |
 //! | `diagnostics` | what measurements and tests change about it |
 //! | `inputs` | voices and head positions to the conditioning of a block |
 //! | `gaze` | the wanted gaze to the gaze channel, free gaze included |
@@ -24,11 +26,17 @@
 //! | `forcing` | what the quantiser's teacher does to a session |
 //! | `probe` | every stage of a block, for whoever wants to check the maths |
 //!
-//! After [`Session::poll`] has been called once, computing a block allocates nothing, takes no lock and makes no system
-//! call. The exceptions are outside the block: the first push of a voice, or a change of its rate, makes a resampler.
+//! Inputs and settings may come from any thread while a block is computed ([`VoiceInput`],
+//! [`HeadInput`], [`Controls`]): nobody waits for the block, and a block goes by what was there
+//! when its poll began.
+//!
+//! After [`Session::poll`] has been called once, computing a block allocates nothing, takes no lock
+//! and makes no system call. The exceptions are outside the block: the first push of a voice, or a
+//! change of its rate, makes a resampler.
 
 mod anchor;
 mod block;
+mod controls;
 mod diagnostics;
 #[cfg(feature = "quant")]
 mod forcing;
@@ -41,11 +49,13 @@ mod pipeline;
 mod poll;
 mod probe;
 mod settings;
+mod shared;
 mod state;
 mod stats;
 mod team;
 mod tools;
 
+pub use controls::Controls;
 pub use diagnostics::{Anchoring, Diagnostics, HistoryTime};
 #[cfg(feature = "quant")]
 pub(crate) use forcing::MadeBlock;
@@ -53,14 +63,16 @@ pub use gaze::GazeControl;
 pub use governor::{Budget, Decision, Governor, GovernorStats, Hold, Plan};
 pub use options::SessionOptions;
 pub use probe::Probe;
+pub use shared::SharedSession;
 pub use stats::{Delays, InputStats, SessionStats};
 pub use team::Team;
 
-use crate::audio::Voice;
+use crate::audio::{Speaker, VoiceInput};
 use crate::engine::Engine;
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::Frame;
 use crate::kernels::Exec;
+use crate::user::HeadInput;
 use glam::Vec3;
 use governor::{Log, Policy};
 use state::BlockState;
@@ -76,10 +88,12 @@ impl Engine {
         Session::new(Arc::clone(self), options)
     }
 
-    /// What it takes to step several sessions of this engine together, on `threads` threads (1 or 2): [`Team`] tells how.
+    /// What it takes to step several sessions of this engine together, on `threads` threads (1 or
+    /// 2): [`Team`] tells how.
     ///
     /// # Errors
-    /// [`ErrorKind::Argument`] for another number of threads; [`ErrorKind::Io`] when the second one cannot be started.
+    /// [`ErrorKind::Argument`] for another number of threads; [`ErrorKind::Io`] when the second one
+    /// cannot be started.
     pub fn team(self: &Arc<Self>, threads: usize) -> Result<Team> {
         Team::new(Arc::clone(self), threads)
     }
@@ -87,19 +101,22 @@ impl Engine {
 
 /// All mutable state of one conversation.
 ///
-/// Time is the caller's: seconds since the session started, the same clock for [`Session::push_user_head`] and
-/// [`Session::poll`]. Audio has no timestamps: each voice is one continuous stream that starts at time 0.
+/// Time is the caller's: seconds since the session started, the same clock for
+/// [`Session::push_user_head`] and [`Session::poll`]. Audio has no timestamps: each voice is one
+/// continuous stream that starts at time 0.
 pub struct Session {
     engine: Arc<Engine>,
     options: SessionOptions,
     exec: Exec,
     work: Workspace,
     state: BlockState,
+    controls: Controls,
     now: f64,
     times: stats::BlockTimes,
     policy: Option<Policy>,
     log: Log,
-    /// The last block, until the next decision: its plan, its work, and the milliseconds that it took.
+    /// The last block, until the next decision: its plan, its work, and the milliseconds that it
+    /// took.
     last: Option<(Plan, f64, f64)>,
     /// In the hands of a team: the block that is due, and the one that is computed.
     due: Option<team::Due>,
@@ -109,8 +126,8 @@ pub struct Session {
 impl Session {
     pub(crate) fn new(engine: Arc<Engine>, options: SessionOptions) -> Result<Self> {
         options.check(&engine)?;
-        let exec = engine.exec(options.threads)?;
-        options.core_mask.map_or(Ok(()), |mask| exec.pool().pin_helper(mask))?;
+        let mut exec = engine.exec(options.threads)?;
+        options.core_mask.map_or(Ok(()), |mask| exec.pool_mut().pin_helper(mask))?;
         Self::on(exec, engine, options)
     }
 
@@ -119,6 +136,7 @@ impl Session {
         let state = BlockState::new(&mut exec, &engine, &options)?;
         let mut session = Self {
             work: Workspace::new(&engine, 1),
+            controls: Controls::new(&engine, |sampler| state.supports(sampler)),
             engine,
             options,
             exec,
@@ -135,46 +153,63 @@ impl Session {
         Ok(session)
     }
 
-    /// Appends to the agent's own voice: mono samples, full scale 1, any rate from 8 to 192 kHz.
+    /// Appends to a voice: mono samples, full scale 1, any rate from 8 to 192 kHz. The same as
+    /// [`VoiceInput::push`] of [`Session::voice_input`].
     ///
-    /// The voice may come ahead of time (text-to-speech does) by up to a minute. Sound that has not come when a block is
-    /// computed is silence there, is counted, and is heard later. A voice that has never been pushed is absent,
-    /// which is not the same as silent.
+    /// The voice may come ahead of time (text-to-speech does) by up to a minute. Sound that has not
+    /// come when a block is computed is silence there, is counted, and is heard later. A voice that
+    /// has never been pushed is absent, which is not the same as silent.
     ///
     /// # Errors
-    /// [`ErrorKind::Audio`] for a bad rate or samples that are not finite; nothing of the push is taken.
+    /// As [`VoiceInput::push`]: [`ErrorKind::Audio`] for a bad rate or samples that are not finite.
+    pub fn push_audio(&mut self, speaker: Speaker, samples: &[f32], rate: u32) -> Result<()> {
+        self.state.inputs.voice(speaker).push(samples, rate)
+    }
+
+    /// [`Session::push_audio`] of the agent's own voice.
+    ///
+    /// # Errors
+    /// As [`Session::push_audio`].
     pub fn push_agent_audio(&mut self, samples: &[f32], rate: u32) -> Result<()> {
-        self.state.inputs.agent_voice().push(samples, rate)
+        self.push_audio(Speaker::Agent, samples, rate)
     }
 
-    /// Appends to the user's voice; as [`Session::push_agent_audio`].
+    /// [`Session::push_audio`] of the user's voice.
     ///
     /// # Errors
-    /// As [`Session::push_agent_audio`].
+    /// As [`Session::push_audio`].
     pub fn push_user_audio(&mut self, samples: &[f32], rate: u32) -> Result<()> {
-        self.state.inputs.user_voice().push(samples, rate)
+        self.push_audio(Speaker::User, samples, rate)
     }
 
-    /// The agent's voice, to end an utterance, to break one off, or to set its presence.
-    pub fn agent_voice(&mut self) -> &mut Voice {
-        self.state.inputs.agent_voice()
-    }
-
-    /// The user's voice, likewise.
-    pub fn user_voice(&mut self) -> &mut Voice {
-        self.state.inputs.user_voice()
-    }
-
-    /// Tells where the user's head is (midpoint of the eyes), world metres, at `time` seconds of session time.
+    /// Tells where the user's head is (midpoint of the eyes), world metres, at `time` seconds of
+    /// session time. The same as [`HeadInput::push`] of [`Session::head_input`].
     ///
-    /// Any rate; positions that are not finite, out of order, or impossible are ignored and counted (see
+    /// Any rate; positions that are not finite, late, or impossible are ignored and counted (see
     /// [`Session::stats`]).
     ///
     /// # Errors
     /// None today; the result leaves room for typed refusals.
     pub fn push_user_head(&mut self, position: Vec3, time: f64) -> Result<()> {
-        self.state.inputs.push_head(position, time);
+        self.state.inputs.head().push(position, time);
+        self.state.inputs.look();
         Ok(())
+    }
+
+    /// A voice's input, for the thread that has its sound: to push, to end an utterance, to break
+    /// one off, to set the voice's presence.
+    pub fn voice_input(&self, speaker: Speaker) -> VoiceInput {
+        self.state.inputs.voice(speaker).clone()
+    }
+
+    /// The input of the user's head, for the thread that tracks it.
+    pub fn head_input(&self) -> HeadInput {
+        self.state.inputs.head().clone()
+    }
+
+    /// The settings, for other threads: what is set there holds from the next poll on.
+    pub fn controls(&self) -> Controls {
+        self.controls.clone()
     }
 
     /// The frames of the last block, or `None` before the first.
@@ -182,8 +217,9 @@ impl Session {
         (self.state.block > self.options.diagnostics.first_block).then_some(&self.state.frames)
     }
 
-    /// The kernel's ids of the threads that this session owns and computes on, for performance hints: the second
-    /// thread's where there is one. The thread that calls [`Session::poll`] computes too ([`crate::threads::current_thread_id`]).
+    /// The kernel's ids of the threads that this session owns and computes on, for performance
+    /// hints: the second thread's where there is one. The thread that calls [`Session::poll`]
+    /// computes too ([`crate::threads::current_thread_id`]).
     pub fn worker_thread_ids(&self) -> impl Iterator<Item = u32> {
         self.exec.pool().helper_id().into_iter()
     }

@@ -122,6 +122,13 @@ pub(super) fn check_guidance(weight: f32) -> Result<()> {
     Err(argument(format!("guidance weight {weight}: 0 to 20")))
 }
 
+pub(super) fn check_block_time(milliseconds: f64) -> Result<()> {
+    if milliseconds.is_finite() && milliseconds >= 0.0 {
+        return Ok(());
+    }
+    Err(argument(format!("a block time of {milliseconds} ms: 0 or more")))
+}
+
 pub(super) fn unsupported(sampler: Sampler, engine: &Engine) -> Error {
     argument(match sampler {
         Sampler::Single if engine.student.is_none() && engine.config.student.is_some() => {

@@ -49,10 +49,11 @@ impl Session {
         outcome.map(|()| Some(self.state.frames.as_slice()))
     }
 
-    /// Sets the time; whether a block is due.
+    /// Sets the time, takes notice of what came from other threads; whether a block is due.
     pub(super) fn is_due(&mut self, now: f64) -> Result<bool> {
         self.check_time(now)?;
         self.now = now;
+        self.take_notice();
         Ok(now >= self.next_due() - 1e-9)
     }
 
@@ -86,19 +87,21 @@ impl Session {
     }
 
     /// Starts anew, as if just made with the current options: same seed, same bits. Time starts at
-    /// 0 again.
+    /// 0 again. What was pushed before is dropped.
     ///
     /// # Errors
     /// None that the session's creation would not have met.
     pub fn reset(&mut self) -> Result<()> {
+        self.take_notice();
         self.forget();
         let mut tools = Tools { exec: &mut self.exec, work: &mut self.work, engine: &self.engine };
         self.state.reset(&mut tools, &self.options, self.engine.idle.view());
         Ok(())
     }
 
-    /// Forgets times and decisions.
+    /// Takes notice of what was set before; forgets times and decisions.
     pub(super) fn forget(&mut self) {
+        self.take_notice();
         self.now = 0.0;
         self.times.clear();
         self.log.clear();

@@ -2,7 +2,7 @@
 
 use super::governor::{self, Decision, Governor, GovernorStats, Hold, Plan, Policy};
 use super::{Session, options};
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::Result;
 use crate::frame::Sampler;
 
 impl Session {
@@ -15,11 +15,16 @@ impl Session {
     /// [`ErrorKind::Argument`] outside -1 to 1.
     pub fn set_gaze(&mut self, target: Option<f32>) -> Result<()> {
         options::check_gaze(target)?;
+        self.controls.settle_gaze();
+        self.apply_gaze(target);
+        Ok(())
+    }
+
+    pub(super) fn apply_gaze(&mut self, target: Option<f32>) {
         if self.options.diagnostics.gaze_control.guides(target) {
             self.state.generator.open_gaze();
         }
         self.options.gaze = target;
-        Ok(())
     }
 
     /// Sets the guidance weights: of the conditioning as a whole (1 is none) and of the gaze
@@ -30,6 +35,7 @@ impl Session {
     pub fn set_guidance(&mut self, weight: f32, gaze: f32) -> Result<()> {
         options::check_guidance(weight)?;
         options::check_guidance(gaze)?;
+        self.controls.settle_guidance();
         (self.options.guidance, self.options.gaze_guidance) = (Some(weight), Some(gaze));
         Ok(())
     }
@@ -43,16 +49,22 @@ impl Session {
         if !self.state.supports(sampler) {
             return Err(options::unsupported(sampler, &self.engine));
         }
+        self.controls.settle_sampler();
+        self.apply_sampler(sampler);
+        Ok(())
+    }
+
+    pub(super) fn apply_sampler(&mut self, sampler: Sampler) {
         if sampler != self.options.sampler {
             self.options.sampler = sampler;
             self.renew_policy();
         }
-        Ok(())
     }
 
-    /// The sampler that was set; what made a frame is in [`Frame::sampler`].
+    /// The sampler that was set, here or by [`Session::controls`]; what made a frame is in
+    /// [`Frame::sampler`](crate::Frame::sampler).
     pub fn sampler(&self) -> Sampler {
-        self.options.sampler
+        self.controls.sampler().unwrap_or(self.options.sampler)
     }
 
     /// Sets who chooses the samplers from the next block on. [`Governor::Off`] pins the session's
@@ -63,9 +75,14 @@ impl Session {
     /// order.
     pub fn set_governor(&mut self, governor: Governor) -> Result<()> {
         governor.check()?;
+        self.controls.settle_budget();
+        self.apply_governor(governor);
+        Ok(())
+    }
+
+    pub(super) fn apply_governor(&mut self, governor: Governor) {
         self.options.governor = governor;
         self.renew_policy();
-        Ok(())
     }
 
     fn renew_policy(&mut self) {
@@ -82,13 +99,16 @@ impl Session {
     /// # Errors
     /// [`ErrorKind::Argument`] for a time that is not finite or negative.
     pub fn report_block_time(&mut self, milliseconds: f64) -> Result<()> {
-        if !(milliseconds.is_finite() && milliseconds >= 0.0) {
-            return Err(Error::new(ErrorKind::Argument, format!("a block time of {milliseconds} ms: 0 or more")));
-        }
+        options::check_block_time(milliseconds)?;
+        self.controls.settle_block_time();
+        self.apply_block_time(milliseconds);
+        Ok(())
+    }
+
+    pub(super) fn apply_block_time(&mut self, milliseconds: f64) {
         if let Some((_, _, measured)) = &mut self.last {
             *measured = milliseconds;
         }
-        Ok(())
     }
 
     /// The decisions of this session, oldest first: each plan that differs from that of the block

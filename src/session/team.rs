@@ -16,7 +16,7 @@ use std::time::Instant;
 ///
 /// Reading the weights is most of a block's time. Sessions whose blocks are due at the same time,
 /// and made by the same sampler with history at the same flow times, go through the flow network
-/// and the decoder side by side, in the flow network up to 16 rows a pass: four without a gaze
+/// and the decoder side by side, in the flow network up to 16 rows per pass: four without a gaze
 /// target, two with one, eight on the single-step student. The others are computed one after the
 /// other. What each session shows has the bits that [`Session::poll`] gives.
 ///

@@ -3,10 +3,12 @@
 use super::{HOLD_SECONDS, MAX_DISTANCE, TELEPORT_SPEED};
 use crate::frame::{BLOCK_FRAMES, FPS};
 use glam::Vec3;
+use std::collections::VecDeque;
 
 /// Samples that a [`HeadTrack::new`] keeps: 68 s at 120 Hz.
-const CAPACITY: usize = 8_192;
-/// Shortest time that speeds are judged over, s: what a tracker's jitter makes of two close time stamps is no teleport.
+pub(super) const CAPACITY: usize = 8_192;
+/// Shortest time that speeds are judged over, s: what a tracker's jitter makes of two close time
+/// stamps is no teleport.
 const SPEED_TIME: f64 = 1.0 / 120.0;
 /// Times further from 0 than this are not believed, s (about 115 days).
 const MAX_TIME: f64 = 1e7;
@@ -39,11 +41,13 @@ pub struct TrackStats {
     pub accepted: u64,
     /// Ignored: NaN or infinity in the position or the time.
     pub non_finite: u64,
-    /// Ignored: not later than the sample before.
+    /// Ignored: late (a block has used a sample of that time or of a later one), or at the time of
+    /// another sample.
     pub out_of_order: u64,
     /// Ignored: more than 1 km from the origin, or a time of more than 10 million seconds.
     pub absurd: u64,
-    /// Taken, but too far from the sample before to have walked there; the way between is not filled in.
+    /// Taken, but too far from the sample before to have walked there; the way between is not
+    /// filled in.
     pub teleports: u64,
     /// Dropped to make room before they were asked for.
     pub overwritten: u64,
@@ -57,18 +61,35 @@ struct Sample {
     jump: bool,
 }
 
+/// Why a sample is of no use, whatever came before it.
+pub(super) enum Fault {
+    NonFinite,
+    Absurd,
+}
+
+pub(super) fn fault(position: Vec3, time: f64) -> Option<Fault> {
+    if !position.is_finite() || !time.is_finite() {
+        return Some(Fault::NonFinite);
+    }
+    // Squares of absurd positions overflow to infinity, which is refused as well.
+    let absurd = position.length_squared() > MAX_DISTANCE * MAX_DISTANCE || time.abs() > MAX_TIME;
+    absurd.then_some(Fault::Absurd)
+}
+
 /// Timed head positions. Bounded; allocates when made and never after.
 ///
-/// Causal: the answer for a frame depends on samples with `time <= now` only, so pushing a whole recording ahead of time
-/// gives what live tracking gives.
+/// Causal: the answer for a frame depends on samples with `time <= now` only, so pushing a whole
+/// recording ahead of time gives what live tracking gives. Samples may come in any order as long as
+/// none was used that is not earlier: what stands is sorted by time.
 #[derive(Debug)]
 pub struct HeadTrack {
-    /// Ring in order of time; the oldest at `first`.
-    samples: Box<[Sample]>,
-    first: usize,
-    len: usize,
+    /// In order of time.
+    samples: VecDeque<Sample>,
+    capacity: usize,
     /// Latest `now` that was asked for.
     asked: f64,
+    /// Time of the last sample that an answer knew.
+    used: f64,
     stats: TrackStats,
 }
 
@@ -80,63 +101,72 @@ impl HeadTrack {
 
     /// An empty track for the last `samples` samples (at least 2).
     pub fn with_capacity(samples: usize) -> Self {
-        let empty = Sample { time: 0.0, position: Vec3::ZERO, jump: false };
+        let capacity = samples.max(2);
         Self {
-            samples: vec![empty; samples.max(2)].into_boxed_slice(),
-            first: 0,
-            len: 0,
+            samples: VecDeque::with_capacity(capacity),
+            capacity,
             asked: f64::NEG_INFINITY,
+            used: f64::NEG_INFINITY,
             stats: TrackStats::default(),
         }
     }
 
-    fn get(&self, i: usize) -> &Sample {
-        &self.samples[(self.first + i) % self.samples.len()]
-    }
-
-    /// Appends a head position (world, metres, within 1 km) at `time` (session time, seconds, later than the one
-    /// before). What does not fit that is ignored and counted, see [`TrackStats`].
+    /// Adds a head position (world, metres, within 1 km) at `time` (session time, seconds), which
+    /// is later than all samples that were used and is no other sample's. What does not fit that is
+    /// ignored and counted, see [`TrackStats`].
     pub fn push(&mut self, position: Vec3, time: f64) {
-        if !position.is_finite() || !time.is_finite() {
-            self.stats.non_finite += 1;
-            return;
+        match fault(position, time) {
+            Some(Fault::NonFinite) => return self.stats.non_finite += 1,
+            Some(Fault::Absurd) => return self.stats.absurd += 1,
+            None => {}
         }
-        // Squares of absurd positions overflow to infinity, which is refused as well.
-        if position.length_squared() > MAX_DISTANCE * MAX_DISTANCE || time.abs() > MAX_TIME {
-            self.stats.absurd += 1;
-            return;
-        }
-        let mut jump = false;
-        if self.len > 0 {
-            let last = self.get(self.len - 1);
-            if time <= last.time {
+        let mut at = self.samples.len();
+        if self.samples.back().is_some_and(|last| time <= last.time) {
+            at = self.samples.partition_point(|s| s.time < time);
+            if time <= self.used || self.samples[at].time == time {
                 self.stats.out_of_order += 1;
                 return;
             }
-            let reach = TELEPORT_SPEED * (time - last.time).max(SPEED_TIME) as f32;
-            jump = position.distance_squared(last.position) > reach * reach;
         }
-        if self.len == self.samples.len() {
-            // Used up once the sample after it may be the answer.
-            if self.get(1).time > self.asked {
+        if self.samples.len() == self.capacity {
+            if at == 0 {
+                // Older than all that there is room for.
+                self.stats.overwritten += 1;
+                return;
+            }
+            // The oldest is used up once the sample after it may be the answer.
+            if self.samples[1].time > self.asked {
                 self.stats.overwritten += 1;
             }
-            self.first = (self.first + 1) % self.samples.len();
-            self.len -= 1;
+            self.samples.pop_front();
+            at -= 1;
         }
-        let at = (self.first + self.len) % self.samples.len();
-        self.samples[at] = Sample { time, position, jump };
-        self.len += 1;
         self.stats.accepted += 1;
-        self.stats.teleports += u64::from(jump);
+        self.samples.insert(at, Sample { time, position, jump: false });
+        self.judge(at);
+        self.judge(at + 1);
     }
 
-    /// The head at `time` (session seconds), as known at `now`: linear between neighbours, both no later than `now`,
-    /// unless they are more than half a second or a teleport apart; else the last one before, for half a second.
+    /// Judges whether the user can have walked to sample `at` from the one before.
+    fn judge(&mut self, at: usize) {
+        let (Some(before), Some(&sample)) = (at.checked_sub(1).map(|i| self.samples[i]), self.samples.get(at)) else {
+            return;
+        };
+        let reach = TELEPORT_SPEED * (sample.time - before.time).max(SPEED_TIME) as f32;
+        let jump = sample.position.distance_squared(before.position) > reach * reach;
+        self.stats.teleports = self.stats.teleports + u64::from(jump) - u64::from(sample.jump);
+        self.samples[at].jump = jump;
+    }
+
+    /// The head at `time` (session seconds), as known at `now`: linear between neighbours, both no
+    /// later than `now`, unless they are more than half a second or a teleport apart; else the last
+    /// one before, for half a second.
     pub fn sample(&mut self, time: f64, now: f64) -> UserSample {
         if now > self.asked {
             self.asked = now;
         }
+        let known = self.count(|t| t <= self.asked);
+        self.used = known.checked_sub(1).map_or(self.used, |last| self.samples[last].time.max(self.used));
         self.peek(time, now)
     }
 
@@ -146,12 +176,12 @@ impl HeadTrack {
         if after == 0 || !time.is_finite() || now.is_nan() {
             return UserSample::default();
         }
-        let before = self.get(after - 1);
+        let before = self.samples[after - 1];
         if before.time == time {
             return UserSample { presence: Presence::Measured, position: before.position };
         }
-        if after < self.len {
-            let next = self.get(after);
+        if after < self.samples.len() {
+            let next = self.samples[after];
             let gap = next.time - before.time;
             if next.time <= now && gap <= HOLD_SECONDS && !next.jump {
                 let part = ((time - before.time) / gap) as f32;
@@ -167,19 +197,11 @@ impl HeadTrack {
 
     /// Number of leading samples whose time satisfies `keep`, which holds up to some time.
     fn count(&self, keep: impl Fn(f64) -> bool) -> usize {
-        let (mut low, mut high) = (0, self.len);
-        while low < high {
-            let middle = low + (high - low) / 2;
-            if keep(self.get(middle).time) {
-                low = middle + 1;
-            } else {
-                high = middle;
-            }
-        }
-        low
+        self.samples.partition_point(|s| keep(s.time))
     }
 
-    /// The head in the four frames from `first_frame` on (frame `i` at `i / 30` s), as known at `now` seconds.
+    /// The head in the four frames from `first_frame` on (frame `i` at `i / 30` s), as known at
+    /// `now` seconds.
     pub fn block(&mut self, first_frame: u64, now: f64, out: &mut [UserSample; BLOCK_FRAMES]) {
         for (i, sample) in out.iter_mut().enumerate() {
             *sample = self.sample((first_frame + i as u64) as f64 / f64::from(FPS), now);
@@ -193,7 +215,8 @@ impl HeadTrack {
 
     /// Empty, as when new.
     pub fn reset(&mut self) {
-        (self.first, self.len, self.asked, self.stats) = (0, 0, f64::NEG_INFINITY, TrackStats::default());
+        self.samples.clear();
+        (self.asked, self.used, self.stats) = (f64::NEG_INFINITY, f64::NEG_INFINITY, TrackStats::default());
     }
 }
 

@@ -65,6 +65,7 @@ fn bad_samples_are_counted_and_ignored() {
     t.push(at(f32::NEG_INFINITY), 1.1);
     t.push(at(0.0), f64::NAN);
     t.push(at(0.5), 1.0);
+    t.sample(1.0, 1.0);
     t.push(at(0.5), 0.5);
     t.push(at(1_001.0), 1.1);
     t.push(at(f32::MAX), 1.1);
@@ -75,6 +76,26 @@ fn bad_samples_are_counted_and_ignored() {
     t.reset();
     assert_eq!(t.stats(), TrackStats::default());
     assert_eq!(t.sample(1.0, 2.0), ABSENT);
+}
+
+#[test]
+fn what_has_not_been_used_is_sorted_and_what_is_late_counted() {
+    let mut t = track(&[(0.0, 0.0), (0.5, 0.5), (0.25, 0.25), (0.75, 0.75)]);
+    assert_eq!(t.sample(0.375, 0.6), measured(0.375));
+    // 0.5 was the last that the answer could know: what follows it is in time, whatever was asked.
+    t.push(at(0.625), 0.625);
+    t.push(at(0.45), 0.45);
+    t.push(at(0.5), 0.5);
+    assert_eq!(t.stats(), TrackStats { accepted: 5, out_of_order: 2, ..Default::default() });
+    assert_eq!(t.sample(0.5625, 0.75), measured(0.5625));
+    // A sample in between takes back a teleport, or makes two.
+    let mut t = track(&[(0.0, 0.0), (2.0, 0.2)]);
+    assert_eq!(t.stats().teleports, 0);
+    t.push(at(9.0), 0.1);
+    assert_eq!(t.stats().teleports, 2);
+    let mut t = track(&[(0.0, 0.0), (2.0, 0.02), (1.0, 0.01)]);
+    t.push(at(2.0), 0.5);
+    assert_eq!((t.stats().teleports, t.sample(0.015, 1.0)), (2, held(1.0)));
 }
 
 #[test]
@@ -90,6 +111,12 @@ fn a_full_track_keeps_the_newest() {
     assert_eq!(t.stats().overwritten, 5);
     assert_eq!(t.sample(0.39, 1.0), measured(0.39));
     assert_eq!(t.sample(0.23, 1.0), ABSENT);
+    t.push(at(0.2), 0.2);
+    assert_eq!((t.stats().accepted, t.stats().out_of_order), (40, 1));
+    let mut t = HeadTrack::with_capacity(2);
+    [0.3, 0.2, 0.1].into_iter().for_each(|time| t.push(at(time as f32), time));
+    assert_eq!(t.stats(), TrackStats { accepted: 2, overwritten: 1, ..Default::default() });
+    assert_eq!(t.sample(0.25, 1.0), measured(0.25));
 }
 
 #[test]
@@ -119,6 +146,25 @@ proptest! {
         for (ask, now) in asks {
             let past: Vec<_> = samples.iter().copied().filter(|s| s.1 <= now).collect();
             prop_assert_eq!(all.sample(ask, now), track(&past).sample(ask, now));
+        }
+    }
+
+    /// Before anything is asked, the order of samples of different times does not matter.
+    #[test]
+    fn sorted_by_time(
+        steps in prop::collection::vec((0.001f64..0.3, -3f32..3.0), 1..60),
+        keys in prop::collection::vec(any::<u32>(), 60),
+        asks in prop::collection::vec(0f64..10.0, 1..20),
+    ) {
+        let mut time = 0.0;
+        let samples: Vec<_> = steps.iter().map(|&(dt, x)| { time += dt; (x, time) }).collect();
+        let mut order: Vec<usize> = (0..samples.len()).collect();
+        order.sort_by_key(|i| keys[*i]);
+        let shuffled: Vec<_> = order.iter().map(|i| samples[*i]).collect();
+        let (mut a, mut b) = (track(&samples), track(&shuffled));
+        prop_assert_eq!(a.stats(), b.stats());
+        for ask in asks {
+            prop_assert_eq!(a.sample(ask, ask), b.sample(ask, ask));
         }
     }
 

@@ -95,6 +95,9 @@ impl Decoder {
             x.copy_from_slice(&self.tokens);
             exec.linear(&self.latent, z.values(), 1, &mut x[..self.latent.out_features()], Epilogue::Add);
         }
+        if pass.rows() == 0 {
+            return;
+        }
         self.stack.run(exec, pass, members, |member| block(member).map(|block| &mut block.state.0), 1..TOKENS);
         let features = pass.project(exec, &self.out, out);
         let blocks = features.chunks_exact(BLOCK_FRAMES * self.out.out_features());

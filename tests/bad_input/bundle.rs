@@ -201,7 +201,8 @@ fn weights_that_are_not_finite_are_corrupt() {
     }
 }
 
-/// A bundle as an asset inside another file, at an offset that is neither of a page nor of a number.
+/// A bundle as an asset inside another file, at an offset that is neither of a page nor of a
+/// number.
 #[test]
 fn a_bundle_inside_another_file() {
     let (bytes, offset) = (tiny_bytes(), 4_097);

@@ -1,5 +1,5 @@
-//! Bundles whose header or config lies: sound JSON with sizes, shapes, offsets and types that contradict each other or the
-//! file. Each is a typed error, found before memory is taken.
+//! Bundles whose header or config lies: sound JSON with sizes, shapes, offsets and types that
+//! contradict each other or the file. Each is a typed error, found before memory is taken.
 
 use super::bundle::{NAME, Parts, tiny_bytes};
 use proptest::prelude::*;
@@ -131,7 +131,8 @@ fn headers_that_lie_are_refused() {
     }
 }
 
-/// Weights that are finite and far too large: the bundle is sound, what it makes is not, and the guard holds a pose.
+/// Weights that are finite and far too large: the bundle is sound, what it makes is not, and the
+/// guard holds a pose.
 #[test]
 fn weights_that_overflow_are_held() {
     for name in ["flow.final.out.weight", "student.final.out.weight", "vae.decoder.out.weight"] {

@@ -1,4 +1,5 @@
-//! What the integration tests share: the tiny bundle, its goldens, and conversations to drive a session with.
+//! What the integration tests share: the tiny bundle, its goldens, and conversations to drive a
+//! session with.
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
 use glam::Vec3;
@@ -93,7 +94,8 @@ pub struct Inputs {
 }
 
 impl Inputs {
-    /// Two syllable-like voices taking turns and a user who walks around the agent, `seconds` long; the same bits on every machine.
+    /// Two syllable-like voices taking turns and a user who walks around the agent, `seconds` long;
+    /// the same bits on every machine.
     pub fn circling(seconds: f64, rate: u32) -> Self {
         let n = (seconds * f64::from(rate)) as usize;
         let voice = |pitch: f64, turn: f64| -> Vec<f32> {

@@ -1,8 +1,9 @@
 //! The modules of a crate and the paths between them, read from its source.
 //!
-//! Files are read as tokens, so comments and strings do not count and what macros are given does. `crate`, `super` and `self`
-//! are resolved from the module that they stand in, inline modules and `#[path]` included, and names that a module takes up
-//! from another (`use`, `pub use`) are followed to where they come from.
+//! Files are read as tokens, so comments and strings do not count and what macros are given does.
+//! `crate`, `super` and `self` are resolved from the module that they stand in, inline modules and
+//! `#[path]` included, and names that a module takes up from another (`use`, `pub use`) are
+//! followed to where they come from.
 
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet};
@@ -116,7 +117,8 @@ impl Modules {
         self.names.entry(module.clone()).or_default().insert(name, path);
     }
 
-    /// The module that `path` leads to: down through modules, and through the names that they took up.
+    /// The module that `path` leads to: down through modules, and through the names that they took
+    /// up.
     fn target(&self, path: &[String], depth: usize) -> Module {
         let mut at = Module::new();
         for (i, segment) in path.iter().enumerate() {
@@ -136,8 +138,9 @@ impl Modules {
         at
     }
 
-    /// Who uses whom among the direct children of `parent`, names followed to where they come from, tests aside. At the root
-    /// tests count, and the first module that is named, so that a room which passes a name on is the one that is used.
+    /// Who uses whom among the direct children of `parent`, names followed to where they come from,
+    /// tests aside. At the root tests count, and the first module that is named, so that a room
+    /// which passes a name on is the one that is used.
     pub fn arrows(&self, parent: &[String]) -> BTreeSet<(String, String)> {
         let mut arrows = BTreeSet::new();
         let counts = |from: &Module| from.starts_with(parent) && (parent.is_empty() || !self.tests.contains(from));

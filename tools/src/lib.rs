@@ -1,4 +1,5 @@
-//! What the `visavis` command does, as a library: recordings in and out, measures, judgements, quantised bundles' reports.
+//! What the `visavis` command does, as a library: recordings in and out, measures, judgements,
+//! quantised bundles' reports.
 //!
 //! | module | what |
 //! |---|---|

@@ -1,4 +1,5 @@
-//! A finished piece of motion with what was heard and seen: what exporters, the viewer and metrics read.
+//! A finished piece of motion with what was heard and seen: what exporters, the viewer and metrics
+//! read.
 
 use glam::Vec3;
 use visavis::{Frame, Rig};
@@ -10,7 +11,8 @@ pub struct Recording {
     pub rig: Rig,
     /// Frames at 30 fps, consecutive.
     pub frames: Vec<Frame>,
-    /// World position of the user's head at each frame, metres; `None` where unknown. As long as `frames`.
+    /// World position of the user's head at each frame, metres; `None` where unknown. As long as
+    /// `frames`.
     pub user: Vec<Option<Vec3>>,
     /// The agent's voice, 24 kHz mono, -1 to 1, starting with frame 0.
     pub agent_voice: Option<Vec<f32>>,

@@ -1,8 +1,9 @@
-//! Given conditioning and noise through a session, every stage out: so that anyone can check the maths against an
-//! implementation of their own.
+//! Given conditioning and noise through a session, every stage out: so that anyone can check the
+//! maths against an implementation of their own.
 //!
-//! Input, a safetensors file (float tensors are f32 or f16; tensors of other names are ignored, so a file may hold expected
-//! results beside its inputs, as those of `training/visavis_train/goldens.py` do):
+//! Input, a safetensors file (float tensors are f32 or f16; tensors of other names are ignored, so
+//! a file may hold expected results beside its inputs, as those of
+//! `training/visavis_train/goldens.py` do):
 //!
 //! | tensor | shape | what |
 //! |---|---|---|
@@ -11,8 +12,9 @@
 //! | `gaze` | `[1]` | gaze target, -1 to 1; none if left out |
 //! | `eps`, `eps_idle` | `[K, Dz]`, `[M, Dz]` | noise of the K blocks and of the idle clip's M tokens, both or neither; else from the seed |
 //!
-//! The K blocks to run are those of `eps`, else as many as the longest of the other inputs covers. Output, stacked over
-//! blocks (T = 4 K frames, B branches: unconditional, conditional, and with gaze when there is a target):
+//! The K blocks to run are those of `eps`, else as many as the longest of the other inputs covers.
+//! Output, stacked over blocks (T = 4 K frames, B branches: unconditional, conditional, and with
+//! gaze when there is a target):
 //!
 //! | tensor | shape | what |
 //! |---|---|---|
@@ -55,13 +57,17 @@ pub struct Trace {
     pub stages: BTreeMap<String, Array>,
 }
 
-/// Runs `input` through a session made with `options`, whose gaze is replaced by the input's, and returns every stage.
+/// Runs `input` through a session made with `options`, whose gaze is replaced by the input's, and
+/// returns every stage.
 ///
-/// For comparisons with an implementation of the networks alone, ask for [`visavis::internals::kernels::KvDtype::F32`] and
-/// [`visavis::internals::session::Anchoring::Never`], and turn [`Diagnostics::bridge`] and [`SessionOptions::stance`] off.
+/// For comparisons with an implementation of the networks alone, ask for
+/// [`visavis::internals::kernels::KvDtype::F32`] and
+/// [`visavis::internals::session::Anchoring::Never`], and turn [`Diagnostics::bridge`] and
+/// [`SessionOptions::stance`] off.
 ///
 /// # Errors
-/// [`ErrorKind::Argument`] for options that the bundle cannot do, [`ErrorKind::Audio`] for voices that are not finite.
+/// [`ErrorKind::Argument`] for options that the bundle cannot do, [`ErrorKind::Audio`] for voices
+/// that are not finite.
 pub fn trace(engine: &Arc<Engine>, input: &TraceInput, options: SessionOptions) -> Result<Trace> {
     let diagnostics = Diagnostics { gaze_control: GazeControl::Channel, ..options.diagnostics };
     let mut session = engine.session(SessionOptions { gaze: input.gaze, diagnostics, ..options })?;

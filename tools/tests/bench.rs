@@ -33,7 +33,23 @@ fn text_names_every_figure() {
     fails(2, &["bench", "--model", TINY, "--size", "base"]);
 }
 
-/// The cold start of seeded weights: a bundle of them is written, loaded by processes of their own, and removed.
+#[test]
+fn beside_other_work_one_and_two_threads_are_compared() {
+    let load = ["bench", "--model", TINY, "--blocks", "4", "--sampler", "single", "--load", "0,2"];
+    let text = succeeds(&load);
+    for part in ["beside 0 busy threads", "beside 2 busy threads", "1 thread", "2 threads", "2 to 1", "mean", "p99"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let json = succeeds(&[&load[..], &["--every", "2", "--json"]].concat());
+    for part in ["under_load", "block_ms", "\"every_ms\": 2.0"] {
+        assert!(json.contains(part), "{part}: {json}");
+    }
+    fails(2, &["bench", "--model", TINY, "--every", "2"]);
+    fails(2, &[&load[..], &["--threads", "1"]].concat());
+}
+
+/// The cold start of seeded weights: a bundle of them is written, loaded by processes of their own,
+/// and removed.
 #[test]
 fn seeded_sizes_start_from_a_file() {
     let dir = Scratch::new("bench");

@@ -1,7 +1,9 @@
-//! Disks that are full, files that change under the reader: a typed error, one line, and nothing half-written.
+//! Disks that are full, files that change under the reader: a typed error, one line, and nothing
+//! half-written.
 //!
-//! The disk is full for a child process alone: its files may not grow beyond a limit (`RLIMIT_FSIZE`, its signal ignored), so
-//! writes fail as they do on a full disk, in every writer and at every size.
+//! The disk is full for a child process alone: its files may not grow beyond a limit
+//! (`RLIMIT_FSIZE`, its signal ignored), so writes fail as they do on a full disk, in every writer
+//! and at every size.
 #![cfg(target_os = "linux")]
 #![allow(unsafe_code, reason = "limits of a child are set between fork and exec")]
 
@@ -49,7 +51,8 @@ fn text(path: &Path) -> &str {
     path.to_str().expect("a plain path")
 }
 
-/// Every file of a run in turn is the one that does not fit; what an earlier run left stays as it was.
+/// Every file of a run in turn is the one that does not fit; what an earlier run left stays as it
+/// was.
 #[test]
 fn a_full_disk_leaves_no_half_file() {
     let scratch = Scratch::new("faults-full");
@@ -131,7 +134,8 @@ fn a_full_standard_output_is_an_error() {
     assert!(message.starts_with("visavis: cannot write to stdout: "), "{message}");
 }
 
-/// A copied bundle does not care what becomes of its file; a mapped one does not care about a rename over it.
+/// A copied bundle does not care what becomes of its file; a mapped one does not care about a
+/// rename over it.
 #[test]
 fn a_bundle_may_be_replaced_while_it_is_open() {
     let scratch = Scratch::new("faults-replaced");
@@ -158,7 +162,8 @@ fn a_bundle_may_be_replaced_while_it_is_open() {
     assert!(e.is_err(), "a device without an end");
 }
 
-/// What `LoadMode::Map` warns of, so that the warning stays true: a child maps a bundle and cuts it.
+/// What `LoadMode::Map` warns of, so that the warning stays true: a child maps a bundle and cuts
+/// it.
 #[test]
 fn a_map_that_is_cut_is_a_bus_error() {
     const CHILD: &str = "VISAVIS_FAULTS_CUT";

@@ -4,31 +4,12 @@ import os
 import numpy as np
 import pytest
 
-from visavis_train.corpus import attention, check, feet, gestures, real, signals, simulate, store, voices
+from visavis_train.corpus import attention, check, feet, gestures, real, rest, signals, simulate, store, voices
 from visavis_train.motion import rig
 
+from standins import fake_rests, fake_sources, fake_voices
+
 FRAMES = 1200
-
-
-def fake_voices(seed=0):
-    """Two speakers of syllable-like bursts: 24 kHz tones with 4 Hz amplitude modulation."""
-    rng = np.random.default_rng(seed)
-    out = {}
-    for name, f0 in (("low", 110), ("high", 210)):
-        phrases = []
-        for _ in range(12):
-            n = int(24000 * rng.uniform(0.5, 4))
-            t = np.arange(n) / 24000
-            amp = 0.2 * (0.15 + np.abs(np.sin(np.pi * 2.2 * t + rng.uniform(0, 3))) ** 2 * rng.uniform(0.5, 1))
-            phrases.append(voices.Phrase(name, (amp * np.sin(2 * np.pi * f0 * t)).astype(np.float32)))
-        out[name] = phrases
-    return out
-
-
-def fake_sources():
-    rng = np.random.default_rng(5)
-    spots = rng.normal((0.05, -0.2, 0.3), 0.08, (50, 3))
-    return simulate.Sources(fake_voices(), None, [], spots, np.zeros((0, 36, 3)))
 
 
 @pytest.fixture(scope="module", params=[0, 3, 7])
@@ -104,9 +85,11 @@ def test_vad_finds_the_bursts():
 def test_wrists_move_more_on_strokes():
     rng = np.random.default_rng(4)
     peaks = list(range(60, 860, 24))
-    arms = gestures.plan(rng, 1800, peaks, np.ones(len(peaks)), [(2, 29)], None, np.zeros((0, 36, 3)), 1.0, np.zeros(1800))
+    own, _, _ = rest.compose(rng, fake_rests(), 1800)
+    arms = gestures.plan(rng, 1800, peaks, np.ones(len(peaks)), [(2, 29)], None, np.zeros((0, 36, 3)), 1.0, own, np.zeros(1800, bool))
     v = np.linalg.norm(np.diff(arms.wrist, axis=1), axis=-1).mean(0) * 30
     assert v[40:880].mean() > 3 * v[960:].mean()
+    assert np.allclose(arms.wrist[:, 960:], own.wrist[960:].swapaxes(0, 1)), "strokes come back to the person's own rest pose"
 
 
 def test_planted_feet_do_not_move():

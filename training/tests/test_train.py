@@ -31,17 +31,22 @@ def small_flow():
                                     embed_voice=12, embed_gaze=4))
 
 
-def item(frames=160, latent=8):
+def made_windows(tmp_path, blocks=16, clips=2, frames=160, latent=8, **kw):
+    """Windows of a cache of `clips` walks with random latents and features; the second voice is absent."""
     p, q = walker(frames)
-    c, roots = data.compact(p, q)
-    k = [(frames - o) // 4 for o in cache.PHASES]
-    return {"name": "a", "z": [torch.randn(n, latent) for n in k], "phases": cache.PHASES, "roots": torch.from_numpy(roots), "user": torch.randn(frames, 3) + 2,
-            "gaze": torch.rand(frames), "agent": torch.randn(frames, 6).half(), "voice": torch.randn(frames, 6).half(), "has": (True, False)}
-
-
-def made_windows(tmp_path, blocks=16, **kw):
+    roots = torch.from_numpy(data.compact(p, q)[1])
+    rows, segments = [], []
+    for i in range(clips):
+        for phase in cache.PHASES:
+            n = (frames - phase) // 4
+            segments.append((i, i * frames + phase, sum(map(len, rows)), n))
+            rows.append(torch.randn(n, latent))
+    total = clips * frames
     path = str(tmp_path / "train.pt")
-    torch.save({"items": [item(), item()], "latent_mean": torch.zeros(8), "latent_std": torch.ones(8)}, path)
+    torch.save({"names": ["a"] * clips, "starts": torch.arange(clips + 1) * frames, "has": torch.tensor([[True, False]] * clips),
+                "roots": roots.repeat(clips, 1), "user": torch.randn(total, 3) + 2, "gaze": torch.rand(total), "agent": torch.randn(total, 6).half(),
+                "voice": torch.randn(total, 6).half(), "still": torch.arange(total) % 8 < 4, "z": torch.cat(rows), "segments": torch.tensor(segments), "latent_mean": torch.zeros(latent),
+                "latent_std": torch.ones(latent)}, path)
     return windows.Windows(path, blocks, **kw)
 
 
@@ -106,37 +111,44 @@ def test_principal_start_reconstructs_better_than_chance():
 
 def test_windows_delay_the_user_one_block_and_mark_absent_voices(tmp_path):
     w = made_windows(tmp_path, drop=0, drop_all=0, drop_gaze=0, prefix=0, jitter=False)
-    it = w.items[0]
-    z, user, agent, voice, g, flags = w.cut(it, 1, 3, 16)
-    first = cache.PHASES[1] + 12
-    assert torch.equal(z, it["z"][1][3:19])
-    assert torch.equal(agent[0], it["agent"][first:first + 4].float().reshape(-1))
-    assert torch.equal(voice[1], it["voice"][first:first + 4].float().reshape(-1))
-    want = geometry.to_local(it["roots"][first - 1], it["user"][first - 4:first][:, [0, 2]].double()).float()
-    assert torch.allclose(user[0], want, atol=1e-6)
-    assert flags.tolist() == [1, 1, 0, 1]
+    segment = w.segments[3:4]  # the second clip at the second phase
+    z, cond = w.read(segment, torch.tensor([3]))
+    first = 160 + cache.PHASES[1] + 12
+    assert torch.equal(z[0], w.z[int(segment[0, 2]) + 3:][:16])
+    assert torch.equal(cond.agent[0, 0], w.agent[first:first + 4].float().reshape(-1))
+    assert torch.equal(cond.voice[0, 1], w.voice[first:first + 4].float().reshape(-1))
+    want = geometry.to_local(w.roots[first - 1], w.user[first - 4:first][:, [0, 2]].double()).float()
+    assert torch.allclose(cond.user[0, 0], want.flatten(), atol=1e-6)
+    assert cond.flags[0, 5].tolist() == [1, 1, 0, 1]
+
+
+def test_windows_stay_in_their_clip(tmp_path):
+    w = made_windows(tmp_path, blocks=38)  # of 39 and 38 blocks
+    for _ in range(20):
+        segment, at = w.draw(4)
+        frames = w.frames(segment, at)
+        clip = segment[:, :1]
+        assert ((frames >= 160 * clip) & (frames < 160 * (clip + 1))).all()
 
 
 def test_voices_that_are_heard_in_training_give_the_features_of_the_whole_clip(tmp_path):
     encoder = AudioEncoder([(1, 4, 10, 5, False), (4, 4, 10, 5, False), (4, 4, 8, 4, False), (4, 4, 8, 4, False), (4, 6, 4, 2, False), (6, 6, 3, 1, True)], 6)
     w = made_windows(tmp_path, drop=0, drop_all=0, drop_gaze=0, prefix=0, jitter=False)
-    w.audio = encoder
-    for it in w.items:
-        it["waves"] = [(torch.randn(800 * len(it["gaze"])) * 3000).short(), None]
-    torch.manual_seed(3)
-    cond = w.batch(8)[1]
-    torch.manual_seed(3)
-    picks = torch.multinomial(w.weights, 8, replacement=True).tolist()
-    for row, pick in enumerate(picks):
-        it, phase, at = w.place(pick)  # the same draws again
-        first = it["phases"][phase] + 4 * at
+    w.audio, w.voices = encoder, (torch.randn(320, 2, 800) * 3000).short()
+    w.has = torch.ones(2, 2)
+    place = w.draw(8)
+    cond = w.batch(8, place)[1]
+    for row, (segment, at) in enumerate(zip(*place)):
+        clip, first = int(segment[0]), int(segment[1] + 4 * at)
         with torch.no_grad():
-            whole = encoder(it["waves"][0].float()[None] / 32768)[0, first:first + 64].reshape(16, -1)
-        assert torch.allclose(cond.agent[row], whole, atol=0.02 * float(whole.abs().max()))
-    assert cond.voice.abs().max() == 0 and cond.flags[..., 2].max() == 0
+            whole = encoder(w.voices[160 * clip:160 * (clip + 1)].permute(1, 0, 2).reshape(2, -1).float() / 32768)
+        for heard, who, start in ((cond.agent, 0, first), (cond.voice, 1, first - 4)):
+            want = whole[who, start - 160 * clip:][:64].reshape(16, -1)
+            assert torch.allclose(heard[row], want, atol=0.02 * float(want.abs().max()))
+    w.has[:, 1] = 0
+    assert w.batch(8, place)[1].voice.abs().max() == 0
     w.live = 3
-    torch.manual_seed(3)
-    some = w.batch(8)[1].agent
+    some = w.batch(8, place)[1].agent
     assert torch.equal(some[:3], cond.agent[:3]) and not torch.allclose(some[3:], cond.agent[3:])
     cond.agent.square().mean().backward()
     assert encoder.conv[0].weight.grad.abs().max() > 0
@@ -180,12 +192,38 @@ def test_flow_losses_fall_when_trained(tmp_path):
     optim, metric, seen = common.optimiser(net, 3e-3), torch.eye(8), []
     for step in range(60):
         z, cond = w.batch(8)
-        loss = (flow.shared_loss if step % 2 else flow.apart_loss)(net, z, cond, metric, 0.1)
+        loss = (flow.shared_loss if step % 2 else flow.apart_loss)(net, z, cond, metric, 0.1, 1.0, 0)
         optim.zero_grad()
         loss.backward()
         optim.step()
         seen.append(loss.item())
     assert sum(seen[-10:]) < 0.9 * sum(seen[:10])
+
+
+def test_late_weights_are_one_on_average_and_weigh_velocities_alike():
+    tau = (torch.arange(100000) + 0.5) / 100000
+    for late in (0, 0.5, 1, 2):
+        assert flow.late_weight(tau, late).mean().item() == pytest.approx(1, abs=1e-3)
+    w = flow.late_weight(torch.tensor([0.0, 0.5, 0.9, 0.99]), 2)
+    assert (w[1] / w[0]).item() == pytest.approx(4, rel=1e-4) and w[2].item() == pytest.approx(w[3].item(), rel=1e-4)
+
+
+def test_still_blocks_are_found(tmp_path):
+    w = made_windows(tmp_path)
+    segment, at = w.draw(3)
+    first = segment[:, 1] + 4 * at
+    want = torch.tensor([[(torch.arange(f + 4 * k, f + 4 * k + 4) % 8 < 4).float().mean() for k in range(16)] for f in first.tolist()])
+    assert torch.equal(w.stillness(segment, at), want)
+
+
+def test_a_rough_latent_space_costs_nothing_unless_asked_for():
+    net, x = make_tiny.lively(vae.Vae(75, 8, 1, 16, 2, 2, 3)), torch.randn(2, 16, 75)
+    torch.manual_seed(1)
+    plain = net(x)[0]
+    torch.manual_seed(1)
+    assert torch.equal(net(x, rough=0.0)[0], plain)
+    apart = [(net(x, noise=False, rough=r)[0] - net(x, noise=False)[0]).square().mean().item() for r in (0.1, 1.0)]
+    assert 0 < apart[0] < apart[1]
 
 
 def test_audio_targets_hear_pitch_and_loudness():

@@ -1,5 +1,4 @@
 """The decoder on roll-outs, the loop that trainers share, processes that train together, bundles taken apart."""
-import json
 import os
 import subprocess
 import sys
@@ -11,7 +10,7 @@ from safetensors.torch import load_file
 from visavis_train import bundle, checkpoints, export, make_tiny
 from visavis_train.motion import rig
 from visavis_train.nets.flow import Condition, FlowNet
-from visavis_train.train import cache, common, decoder, student, vae
+from visavis_train.train import cache, decoder, student, vae
 
 
 def still_body(frames=32):
@@ -63,54 +62,19 @@ from visavis_train.train.team import Team
 team = Team(2)
 net = torch.nn.Linear(1, 1, bias=False)
 net.weight.grad = torch.full((1, 1), 2.0 if team.leads else 4.0)
-progress = team.average(net, 0.25 if team.leads else 0.9)
-open(sys.argv[1] + str(team.rank), "w").write(f"{net.weight.grad.item()} {progress}")
+stop = team.average(net, team.leads)
+mine = team.gather({team.rank: torch.tensor([team.rank])}, sys.argv[1] + "part")
+open(sys.argv[1] + str(team.rank), "w").write(f"{net.weight.grad.item()} {stop} {team.agree(7 + team.rank)} {sorted(mine)}")
 team.close()
 """
 
 
-def test_two_processes_average_gradients_and_agree_on_progress(tmp_path):
+def test_two_processes_average_gradients_and_agree(tmp_path):
     script = tmp_path / "team.py"
     script.write_text(TEAM)
     here = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
     subprocess.run([sys.executable, str(script), str(tmp_path / "out")], check=True, timeout=300, env=here)
-    assert [(tmp_path / f"out{r}").read_text() for r in (0, 1)] == ["3.0 0.25", "3.0 0.25"]
-
-
-class Alone:
-    """A team of one."""
-    leads = True
-
-    def average(self, net, progress):
-        return progress
-
-    def close(self):
-        pass
-
-
-def test_a_loop_learns_logs_and_goes_on_where_it_stood(tmp_path):
-    out, x = str(tmp_path / "net.pt"), torch.randn(64, 3)
-    wish = x @ torch.tensor([[1.0], [-2.0], [0.5]])
-    net = torch.nn.Linear(3, 1)
-    error = lambda n: (n(x) - wish).square().mean()
-    before = error(net).item()
-    loop = common.Loop(Alone(), net, out, 100.0, 0.05, warmup=5, average=0.9, size=3)
-    for _ in range(40):
-        loss = error(net)
-        loop.update(loss, loss=loss)
-        loop.report(10, lambda n: {"val": error(n).item()}, 20)
-    rows = [json.loads(line) for line in open(out + ".jsonl")]
-    assert [r["step"] for r in rows] == [10, 20, 30, 40]
-    assert ["val" in r for r in rows] == [False, True, False, True]
-    assert rows[0]["loss"] > rows[-1]["loss"] and rows[-1]["val"] < 0.5 * before
-    other = torch.nn.Linear(3, 1)
-    again = common.Loop(Alone(), other, out, 100.0, 0.05, resume=True, size=3)
-    assert again.step == 40 and again.clock.elapsed > 0
-    assert torch.equal(other.weight, net.weight) and torch.equal(again.ema.net.weight, loop.ema.net.weight)
-    again.finish()
-    kept = torch.load(out, weights_only=False)
-    assert kept["size"] == 3 and kept["step"] == 40
-    assert [json.loads(line)["step"] for line in open(out + ".jsonl")][-1] == 40
+    assert [(tmp_path / f"out{r}").read_text() for r in (0, 1)] == ["3.0 True 7 [0, 1]", "3.0 True 7 []"]
 
 
 def test_the_teacher_is_asked_for_what_gives_the_target():
@@ -131,7 +95,7 @@ def test_maps_from_flow_time_are_f16_even_in_an_f32_bundle(tmp_path):
 
 def test_chunks_encoded_together_equal_the_clip_encoded_at_once():
     net = make_tiny.lively(vae.Vae(7, latent=4, layers=2, width=16, heads=2, mlp=2, window_blocks=3)).eval()
-    blocks = cache.CHUNK * (cache.TOGETHER + 2) + 5  # several at a time, a last lot of fewer, a short chunk at the end
+    blocks = cache.CHUNK * (cache.TOGETHER["cpu"] + 2) + 5  # several at a time, a last lot of fewer, a short chunk at the end
     x = torch.randn(4 * blocks, 7)
     with torch.no_grad(), torch.autocast("cpu", torch.bfloat16):
         whole = net.encoder(x[None])[0][0].float()

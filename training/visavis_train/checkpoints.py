@@ -16,10 +16,10 @@ def split(b):
     """Checkpoints {name: state} of an open bundle."""
     width = b.config["audio"]["features"]
     latents = {"latent_mean": b.stat("latent_mean"), "latent_std": b.stat("latent_std")}
-    flow = {"size": {k: v for k, v in b.config["flow"].items()}, "latent": b.config["vae"]["latent"], "audio": width, "step": 0, "elapsed": 0.0}
+    flow = {"size": {k: v for k, v in b.config["flow"].items()}, "latent": b.config["vae"]["latent"], "audio": width}
     both = lambda net: {"net": net.state_dict(), "ema": net.state_dict()}
-    out = {"audio": {"net": b.audio.state_dict(), "spec": b.audio.spec, "features": width},
-           "vae": both(b.vae) | {"size": dict(b.config["vae"]), "mean": b.stat("pose_mean"), "std": b.stat("pose_std"), "step": 0, "elapsed": 0.0},
+    out = {"audio": both(b.audio) | {"spec": b.audio.spec, "features": width},
+           "vae": both(b.vae) | {"size": dict(b.config["vae"]), "mean": b.stat("pose_mean"), "std": b.stat("pose_std")},
            "flow": both(b.flow) | flow | latents}
     if b.student is not None:
         out["student"] = both(b.student) | flow | latents | b.config["student"]

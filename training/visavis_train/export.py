@@ -2,8 +2,8 @@
 
     python -m visavis_train.export --corpus DIR --audio runs/audio.pt --vae runs/vae.pt --flow runs/flow.pt [--student runs/student.pt] --out B.safetensors [--half]
 
-Averaged (EMA) weights are written. The idle clip, from which sessions start, is the calmest stretch of the corpus: both feet planted, hands
-low and slow, facing the user; turned so that it ends facing +Z (features are relative, so nothing needs turning).
+Averaged (EMA) weights are written. The idle clip, from which sessions start, is the calmest stretch of a real person at rest (of conversations where there is
+no such clip): both feet planted, hands low and slow, facing the user; turned so that it ends facing +Z (features are relative, so nothing needs turning).
 """
 import argparse
 import os
@@ -11,17 +11,13 @@ import os
 import numpy as np
 import torch
 
-from . import bundle
+from . import bundle, credits
 from .motion import rig
-from .nets.audio import AudioEncoder
-from .nets.flow import FlowNet
 from .train.cache import load_audio, load_vae
 from .train.data import clips, expand, load_motion
+from .train.flow import load_flow
 from .train.geometry import integrate, local_positions, to_world
 
-LICENCE = ("Weights made from public material: the data used in this project was obtained from mocap.cs.cmu.edu; the database was created with "
-           "funding from NSF EIA-0196217. Voices: LJ Speech (public domain), AMI Corpus (CC BY 4.0), Amazon dyadic calls (Apache-2.0), "
-           "Microsoft speech samples (MIT). The motion capture may not be resold, even in converted form.")
 DESCRIPTION = ("Conversation motion of a standing agent, trained on a corpus simulated from real clips and real speech (no captured conversations). "
                "Figures measured on it compare models with each other and are not those of the SARAH paper.")
 
@@ -44,7 +40,9 @@ def restlessness(frames, roots, n):
 def idle_clip(corpus, split, n, limit=80, known=None):
     """Feature vectors [n, F] of the calmest stretch, and the name of its clip."""
     best = (np.inf, None, None)
-    for path in [p for p in clips(corpus, split) if "talk" in p][:limit]:
+    paths = clips(corpus, split)
+    named = lambda kind: [p for p in paths if os.path.basename(p).startswith(kind)]
+    for path in (named("idle") or named("talk"))[:limit]:
         clip, frames, roots, gaze = load_motion(path)
         cost = restlessness(frames, roots, n) + 0.5 * (1 - gaze.unfold(0, n, 1).mean(-1)).clamp(min=0)
         at = int(cost[1:].argmin()) + 1
@@ -53,14 +51,7 @@ def idle_clip(corpus, split, n, limit=80, known=None):
     return best[1], best[2]
 
 
-def load_flow(path):
-    state = torch.load(path, weights_only=False)
-    net = FlowNet(state["latent"], state["audio"], **state["size"])
-    net.load_state_dict(state["ema"])
-    return net.eval(), state
-
-
-def assemble(audio, vae_path, flow_path, student_path, idle, name, session=None):
+def assemble(audio, vae_path, flow_path, student_path, idle, name, licence, session=None):
     """Tensors and configuration of a bundle."""
     vae, mean, std, vae_state = load_vae(vae_path)
     flow, state = load_flow(flow_path)
@@ -76,7 +67,7 @@ def assemble(audio, vae_path, flow_path, student_path, idle, name, session=None)
         tensors |= bundle.net_tensors(prefix, net)
     rig_json = bundle.rig_config(rig.NAMES, rig.PARENTS, rig.OFFSETS, rig.EYES, rig.HEAD_BACK)
     config = bundle.make_config(rig_json, audio.spec, audio.out.out_features, vae_state["size"], state["size"], name=name,
-                                description=DESCRIPTION, licence=LICENCE, student=student, session=session)
+                                description=DESCRIPTION, licence=licence, student=student, session=session)
     return tensors, config
 
 
@@ -99,9 +90,9 @@ def main():
     else:
         idle, where = idle_clip(args.corpus, "train", args.idle_frames)
         if idle is None:
-            raise SystemExit(f"no conversation clips under {args.corpus}/train")
+            raise SystemExit(f"no clips of conversations or people at rest under {args.corpus}/train")
         print(f"idle clip from {where}")
-    tensors, config = assemble(load_audio(args.audio), args.vae, args.flow, args.student, idle, args.name,
+    tensors, config = assemble(load_audio(args.audio), args.vae, args.flow, args.student, idle, args.name, credits.licence(args.corpus),
                                {k: v for k in ("guidance", "gaze_guidance", "temperature") if (v := getattr(args, k)) is not None})
     bundle.write(args.out, tensors, config, half=args.half, narrow=NARROW)
     print(f"{args.out}: {os.path.getsize(args.out) / 1e6:.1f} MB")

@@ -15,7 +15,8 @@ pub(crate) struct Microphone {
 
 struct Stream(#[expect(dead_code, reason = "held to keep the stream open")] AudioStream);
 
-// SAFETY: AAudio lets any thread call and close a stream, one at a time; this one is only held, and dropped once.
+// SAFETY: AAudio lets any thread call and close a stream, one at a time; this one is only held, and
+// dropped once.
 unsafe impl Send for Stream {}
 
 impl Microphone {
@@ -34,7 +35,8 @@ impl Microphone {
             .data_callback(Box::new(move |_, data, frames| {
                 let count = usize::try_from(frames).unwrap_or(0);
                 if !data.is_null() && count > 0 {
-                    // SAFETY: AAudio hands over `frames` frames of one float each, for the time of this call.
+                    // SAFETY: AAudio hands over `frames` frames of one float each, for the time of
+                    // this call.
                     tap.push(unsafe { std::slice::from_raw_parts(data.cast_const().cast::<f32>(), count) });
                 }
                 AudioCallbackResult::Continue

@@ -4,12 +4,13 @@
 //! audio thread: callback -> Tap -> lock-free ring -> AudioInput::read :application's thread
 //! ```
 //!
-//! The callback copies into a ring and counts what does not fit: it allocates nothing, takes no lock and makes no system call. Streams
-//! ask for the *voice communication* preset, with which Android cancels the echo of what the device plays, so that the agent
-//! does not hear itself.
+//! The callback copies into a ring and counts what does not fit: it allocates nothing, takes no
+//! lock and makes no system call. Streams ask for the *voice communication* preset, with which
+//! Android cancels the echo of what the device plays, so that the agent does not hear itself.
 //!
-//! A microphone is optional. Where there is none, the permission is missing or the platform refuses, [`open`] says so with
-//! an [`Unavailable`]; the session then runs without the user's voice, which is a state that the model knows.
+//! A microphone is optional. Where there is none, the permission is missing or the platform
+//! refuses, [`open`] says so with an [`Unavailable`]; the session then runs without the user's
+//! voice, which is a state that the model knows.
 //!
 //! | backend | when |
 //! |---|---|
@@ -30,7 +31,8 @@ pub trait AudioInput: Send {
     /// Samples a second, Hz.
     fn rate(&self) -> u32;
 
-    /// Moves what was captured since the last call into `out`, oldest first, as far as there is room; returns how many samples. Never waits.
+    /// Moves what was captured since the last call into `out`, oldest first, as far as there is
+    /// room; returns how many samples. Never waits.
     fn read(&mut self, out: &mut [f32]) -> usize;
 
     /// Counters since the stream was opened.
@@ -44,7 +46,8 @@ pub struct Counters {
     pub captured: u64,
     /// Of these, dropped because nobody had read for [`Options::seconds`].
     pub dropped: u64,
-    /// Whether the stream has ended by itself: device unplugged, microphone taken away. Open another.
+    /// Whether the stream has ended by itself: device unplugged, microphone taken away. Open
+    /// another.
     pub ended: bool,
 }
 
@@ -88,8 +91,8 @@ impl Unavailable {
 /// Opens and starts the platform's microphone.
 ///
 /// # Errors
-/// [`Unavailable`] where there is none: no such device, no `RECORD_AUDIO` permission, refused by the platform, not Android;
-/// also for options out of range.
+/// [`Unavailable`] where there is none: no such device, no `RECORD_AUDIO` permission, refused by
+/// the platform, not Android; also for options out of range.
 pub fn open(options: Options) -> Result<Box<dyn AudioInput>, Unavailable> {
     if !(8_000..=192_000).contains(&options.rate) || !(0.1..=60.0).contains(&options.seconds) {
         let Options { rate, seconds } = options;

@@ -1,4 +1,5 @@
-//! The audio thread's side allocates nothing: proved with an allocator that counts. One test in one binary.
+//! The audio thread's side allocates nothing: proved with an allocator that counts. One test in one
+//! binary.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};

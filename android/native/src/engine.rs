@@ -1,6 +1,6 @@
 //! Engines.
 
-use crate::buffers::elements;
+use crate::buffers::{bytes, elements};
 use crate::error::{Failure, Outcome, Throw};
 use crate::handles::Table;
 use crate::native;
@@ -8,8 +8,8 @@ use jni::Env;
 use jni::objects::{JByteArray, JByteBuffer, JClass, JFloatArray, JIntArray, JObjectArray, JString};
 use jni::sys::{jboolean, jint, jlong};
 use std::sync::Arc;
+use visavis::Engine;
 use visavis::openxr::{OPENXR_JOINTS, openxr_joint};
-use visavis::{BundleFile, Engine, Networks};
 
 pub(crate) static ENGINES: Table<Engine> = Table::new("engine");
 
@@ -40,12 +40,10 @@ fn engine_from_fd<'l>(_: &mut Env<'l>, _: JClass<'l>, fd: jint, offset: jlong, l
     if fd < 0 {
         return Err(argument("the file descriptor"));
     }
-    // SAFETY: not -1, and open for the time of this call: Java holds the ParcelFileDescriptor. Duplicating a closed one fails.
-    let borrowed = unsafe { std::os::fd::BorrowedFd::borrow_raw(fd) };
-    let io = |e| visavis::Error::io("duplicate the descriptor", "file descriptor", e);
-    let file = std::fs::File::from(borrowed.try_clone_to_owned().map_err(io)?);
-    let part = BundleFile::open_part(&file, offset, length, "bundle asset")?;
-    Ok(ENGINES.insert(Engine::from_bundle(&part, Networks::default())?))
+    // SAFETY: not -1, and open for the time of this call: Java holds the ParcelFileDescriptor.
+    // Duplicating a closed one fails.
+    let fd = unsafe { std::os::fd::BorrowedFd::borrow_raw(fd) };
+    Ok(ENGINES.insert(Engine::from_fd(fd, offset, length)?))
 }
 
 fn engine_from_buffer<'l>(
@@ -55,9 +53,9 @@ fn engine_from_buffer<'l>(
     position: jint,
     length: jint,
 ) -> Outcome<jlong> {
-    // SAFETY: read only; should Java change it meanwhile, loading sees other numbers, which it checks.
-    let bytes = unsafe { elements::<u8>(env, buffer.as_ref(), position, length) }?;
-    Ok(ENGINES.insert(Engine::from_slice(bytes, "bundle in memory")?))
+    // SAFETY: a ByteBuffer.
+    let there = unsafe { elements(env, buffer.as_ref(), position, length) }?;
+    Ok(ENGINES.insert(Engine::from_bytes(bytes(there), "bundle in memory")?))
 }
 
 fn engine_from_bytes<'l>(env: &mut Env<'l>, _: JClass<'l>, bytes: JByteArray<'l>) -> Outcome<jlong> {
@@ -73,7 +71,7 @@ fn engine_close<'l>(_: &mut Env<'l>, _: JClass<'l>, engine: jlong) -> Outcome<jb
 }
 
 fn engine_name<'l>(env: &mut Env<'l>, _: JClass<'l>, engine: jlong) -> Outcome<JString<'l>> {
-    Ok(JString::from_str(env, &ENGINES.get(engine)?.name())?)
+    Ok(JString::from_str(env, ENGINES.get(engine)?.name())?)
 }
 
 fn engine_has_student<'l>(_: &mut Env<'l>, _: JClass<'l>, engine: jlong) -> Outcome<jboolean> {

@@ -114,6 +114,7 @@ fn throw(env: &mut Env<'_>, failure: &Failure) {
         return;
     }
     let text = JNIString::from(failure.to_string());
-    // Throwing reports the exception it has thrown as an error. What else may fail here leaves an exception of its own.
+    // Throwing reports the exception it has thrown as an error. What else may fail here leaves an
+    // exception of its own.
     let _ = env.throw_new(failure.exception(), text);
 }

@@ -3,11 +3,12 @@
 use crate::error::{Failure, Outcome, Throw};
 use crate::handles::Table;
 use crate::native;
-use crate::session::{push, with};
+use crate::session::around;
 use jni::Env;
 use jni::objects::{JClass, JLongArray};
 use jni::sys::{jboolean, jfloat, jint, jlong};
 use std::sync::{Arc, Mutex, PoisonError};
+use visavis::Speaker;
 use visavis_microphone::{AudioInput, Options, open};
 
 pub(crate) static MICROPHONES: Table<Mutex<Box<dyn AudioInput>>> = Table::new("microphone");
@@ -56,7 +57,7 @@ fn microphone_pump<'l>(_: &mut Env<'l>, _: JClass<'l>, microphone: jlong, sessio
             if count == 0 {
                 return Ok(total);
             }
-            with(session, |s| push(s, 1, &samples[..count], rate))?;
+            around(session, |shared| Ok(shared.voice(Speaker::User).push(&samples[..count], rate)?))?;
             total += count as jint;
         }
     })

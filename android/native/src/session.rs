@@ -1,21 +1,23 @@
 //! Sessions.
 
-use crate::buffers::{elements, part};
+use crate::buffers::{elements, part, with_floats, with_scratch};
 use crate::engine::ENGINES;
 use crate::error::{Failure, Outcome, Throw};
 use crate::handles::Table;
 use crate::native;
-use glam::Vec3;
 use jni::Env;
 use jni::objects::{JClass, JFloatArray, JIntArray, JObject, JString};
 use jni::sys::{jboolean, jdouble, jfloat, jint, jlong};
-use std::cell::RefCell;
-use std::sync::{Arc, Mutex, MutexGuard};
-use visavis::{BLOCK_FRAMES, Budget, Frame, Governor, Root, Session, SessionOptions, Voice};
+use std::sync::Arc;
+use std::sync::atomic::AtomicU32;
+use std::sync::atomic::Ordering::Relaxed;
+use visavis::glam::Vec3;
+use visavis::{BLOCK_FRAMES, Frame, Governor, Root, Session, SessionOptions, SharedSession, Speaker, VoiceInput};
 
-pub(crate) static SESSIONS: Table<Mutex<Session>> = Table::new("session");
+pub(crate) static SESSIONS: Table<SharedSession> = Table::new("session");
 
-/// Floats of a frame before its joints: root x, z, yaw; hips x, y, z; gaze score (NaN: not known); fit error; held; evaluations.
+/// Floats of a frame before its joints: root x, z, yaw; hips x, y, z; gaze score (NaN: not known);
+/// fit error; held; evaluations.
 const HEAD: usize = 10;
 /// Floats of a joint: local rotation 4, world position 3, world rotation 4.
 const JOINT: usize = 11;
@@ -45,37 +47,30 @@ native!("Java_org_visavis_Native_reset": reset(session: jlong));
 native!("Java_org_visavis_Native_warmUp": warm_up(session: jlong, blocks: jint));
 native!("Java_org_visavis_Native_workerThreadIds": worker_thread_ids(session: jlong) -> jint[]);
 
+/// Runs `body` on what goes around a session: inputs and controls, whoever is inside it. Waits for
+/// nobody.
+pub(crate) fn around<T>(session: jlong, body: impl FnOnce(&SharedSession) -> Outcome<T>) -> Outcome<T> {
+    let shared = SESSIONS.get(session)?;
+    if shared.is_poisoned() {
+        return Err(poisoned());
+    }
+    body(&shared)
+}
+
 /// Runs `body` on a session; calls from several threads take turns.
 pub(crate) fn with<T>(session: jlong, body: impl FnOnce(&mut Session) -> Outcome<T>) -> Outcome<T> {
-    let session = SESSIONS.get(session)?;
-    let mut guard: MutexGuard<'_, Session> = session.lock().map_err(|_| {
-        Failure::Fault("this session met an internal fault before: close it and make another".to_owned())
-    })?;
-    body(&mut guard)
+    around(session, |shared| body(&mut *shared.lock().map_err(|_| poisoned())?))
 }
 
-fn of(session: &mut Session, voice: jint) -> Outcome<&mut Voice> {
-    match voice {
-        0 => Ok(session.agent_voice()),
-        1 => Ok(session.user_voice()),
-        _ => Err(Failure::Argument(format!("voice {voice}: 0 is the agent, 1 the user"))),
-    }
+fn poisoned() -> Failure {
+    Failure::Fault("this session met an internal fault before: close it and make another".to_owned())
 }
 
-pub(crate) fn push(session: &mut Session, voice: jint, samples: &[f32], rate: u32) -> Outcome {
-    match voice {
-        0 => session.push_agent_audio(samples, rate)?,
-        _ => session.push_user_audio(samples, rate)?,
-    }
-    Ok(())
-}
-
-/// No governor for 0, else one with that budget, milliseconds a block.
-fn governor(budget: f32) -> Governor {
-    if budget == 0.0 {
-        return Governor::Off;
-    }
-    Governor::Budget(Budget { milliseconds: budget, ..Default::default() })
+fn of(session: jlong, voice: jint, body: impl FnOnce(&VoiceInput)) -> Outcome {
+    around(session, |shared| {
+        body(shared.voice(Speaker::try_from(voice)?));
+        Ok(())
+    })
 }
 
 fn rate(rate: jint) -> Outcome<u32> {
@@ -117,10 +112,10 @@ fn session_new<'l>(
         start: Root { x, z, yaw },
         stance,
         guard,
-        governor: governor(budget),
+        governor: Governor::within(budget),
         ..Default::default()
     };
-    Ok(SESSIONS.insert(Arc::new(Mutex::new(engine.session(options)?))))
+    Ok(SESSIONS.insert(Arc::new(SharedSession::new(engine.session(options)?))))
 }
 
 fn session_close<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong) -> Outcome<jboolean> {
@@ -138,17 +133,12 @@ fn push_buffer<'l>(
     count: jint,
     rate_: jint,
 ) -> Outcome {
-    with(session, |s| {
-        of(s, voice)?;
-        // SAFETY: read only; see `elements`.
-        let samples = unsafe { elements::<f32>(env, &buffer, position, count) }?;
-        push(s, voice, samples, rate(rate_)?)
+    around(session, |shared| {
+        // SAFETY: a FloatBuffer; Java has checked the order of its bytes.
+        let samples = unsafe { elements(env, &buffer, position, count) }?;
+        let (voice, rate) = (shared.voice(Speaker::try_from(voice)?), rate(rate_)?);
+        Ok(with_floats(samples, |samples| voice.push(samples, rate))?)
     })
-}
-
-thread_local! {
-    /// Samples of an array on their way: as large as the largest push of this thread.
-    static SCRATCH: RefCell<Vec<f32>> = const { RefCell::new(Vec::new()) };
 }
 
 #[expect(clippy::too_many_arguments, reason = "a part of an array is three of them")]
@@ -166,55 +156,54 @@ fn push_array<'l>(
         return Err(jni::errors::Error::NullPtr("samples are null").into());
     }
     let count = part(samples.len(env)?, offset, count)?;
-    SCRATCH.with_borrow_mut(|scratch| {
-        scratch.resize(scratch.len().max(count), 0.0);
-        samples.get_region(env, offset, &mut scratch[..count])?;
-        with(session, |s| {
-            of(s, voice)?;
-            push(s, voice, &scratch[..count], rate(rate_)?)
-        })
+    with_scratch(count, |scratch| {
+        samples.get_region(env, offset, scratch)?;
+        around(session, |shared| Ok(shared.voice(Speaker::try_from(voice)?).push(scratch, rate(rate_)?)?))
     })
 }
 
 fn finish_voice<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, voice: jint) -> Outcome {
-    with(session, |s| of(s, voice).map(Voice::finish))
+    of(session, voice, VoiceInput::finish)
 }
 
 fn clear_voice<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, voice: jint) -> Outcome {
-    with(session, |s| of(s, voice).map(Voice::clear))
+    of(session, voice, VoiceInput::clear)
 }
 
 fn set_voice_present<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, voice: jint, present: jboolean) -> Outcome {
-    with(session, |s| of(s, voice).map(|v| v.set_present(present)))
+    of(session, voice, |voice| voice.set_present(present))
 }
 
 fn push_head<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, x: f32, y: f32, z: f32, time: f64) -> Outcome {
-    with(session, |s| Ok(s.push_user_head(Vec3::new(x, y, z), time)?))
+    around(session, |shared| {
+        shared.head().push(Vec3::new(x, y, z), time);
+        Ok(())
+    })
 }
 
 fn set_gaze<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, target: jfloat) -> Outcome {
-    with(session, |s| Ok(s.set_gaze(Some(target))?))
+    around(session, |s| Ok(s.controls().set_gaze(Some(target))?))
 }
 
 fn set_natural_gaze<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong) -> Outcome {
-    with(session, |s| Ok(s.set_gaze(None)?))
+    around(session, |s| Ok(s.controls().set_gaze(None)?))
 }
 
 fn set_guidance<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, weight: jfloat, gaze: jfloat) -> Outcome {
-    with(session, |s| Ok(s.set_guidance(weight, gaze)?))
+    around(session, |s| Ok(s.controls().set_guidance(weight, gaze)?))
 }
 
 fn set_sampler<'l>(env: &mut Env<'l>, _: JClass<'l>, session: jlong, sampler: JString<'l>) -> Outcome {
     let sampler = sampler.try_to_string(env)?.parse()?;
-    with(session, |s| Ok(s.set_sampler(sampler)?))
+    around(session, |s| Ok(s.controls().set_sampler(sampler)?))
 }
 
 fn set_budget<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, milliseconds: jfloat) -> Outcome {
-    with(session, |s| Ok(s.set_governor(governor(milliseconds))?))
+    around(session, |s| Ok(s.controls().set_budget(milliseconds)?))
 }
 
 fn report_block_time<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, milliseconds: jdouble) -> Outcome {
-    with(session, |s| Ok(s.report_block_time(milliseconds)?))
+    around(session, |s| Ok(s.controls().report_block_time(milliseconds)?))
 }
 
 fn sampler<'l>(env: &mut Env<'l>, _: JClass<'l>, session: jlong) -> Outcome<JString<'l>> {
@@ -222,18 +211,23 @@ fn sampler<'l>(env: &mut Env<'l>, _: JClass<'l>, session: jlong) -> Outcome<JStr
     Ok(JString::from_str(env, name)?)
 }
 
-/// Writes the frames of a block, `HEAD + JOINT * joints` floats each.
-fn write(frames: &[Frame], out: &mut [f32]) {
-    let mut out = out.iter_mut();
-    let mut put = |values: &[f32]| out.by_ref().zip(values).for_each(|(to, v)| *to = *v);
+/// Hands the frames of a block to `put`, `HEAD + JOINT * joints` floats each, with their places.
+pub(crate) fn write(frames: &[Frame], mut put: impl FnMut(usize, f32)) {
+    let mut at = 0;
+    let mut put_all = |values: &[f32]| {
+        for value in values {
+            put(at, *value);
+            at += 1;
+        }
+    };
     for f in frames {
-        put(&[f.root.x as f32, f.root.z as f32, f.root.yaw as f32]);
-        put(&f.hips.to_array());
-        put(&[f.gaze.unwrap_or(f32::NAN), f.fit_error, f.held, f.sampler.evaluations() as f32]);
+        put_all(&[f.root.x as f32, f.root.z as f32, f.root.yaw as f32]);
+        put_all(&f.hips.to_array());
+        put_all(&[f.gaze.unwrap_or(f32::NAN), f.fit_error, f.held, f.sampler.evaluations() as f32]);
         for (global, local) in f.global.iter().zip(&f.local) {
-            put(&local.to_array());
-            put(&global.position.to_array());
-            put(&global.rotation.to_array());
+            put_all(&local.to_array());
+            put_all(&global.position.to_array());
+            put_all(&global.rotation.to_array());
         }
     }
 }
@@ -264,10 +258,11 @@ fn poll_buffer<'l>(
 ) -> Outcome<jint> {
     with(session, |s| {
         let needed = room(s, usize::try_from(count).unwrap_or(0))?;
-        // SAFETY: Java's caller owns the buffer for the time of the call; what is there is not read.
-        let out = unsafe { elements::<f32>(env, &out, position, needed as jint) }?;
+        // SAFETY: a FloatBuffer that is not read-only; Java has checked that, and the order of its
+        // bytes.
+        let out: &[AtomicU32] = unsafe { elements(env, &out, position, needed as jint) }?;
         let Some(frames) = s.poll(now)? else { return Ok(0) };
-        write(frames, out);
+        write(frames, |at, value| out[at].store(value.to_bits(), Relaxed));
         Ok(frames.len() as jint)
     })
 }
@@ -287,10 +282,9 @@ fn poll_array<'l>(
     with(session, |s| {
         let needed = room(s, there.saturating_sub(usize::try_from(offset).unwrap_or(there)))?;
         let Some(frames) = s.poll(now)? else { return Ok(0) };
-        SCRATCH.with_borrow_mut(|scratch| {
-            scratch.resize(scratch.len().max(needed), 0.0);
-            write(frames, &mut scratch[..needed]);
-            out.set_region(env, offset, &scratch[..needed])?;
+        with_scratch(needed, |scratch| {
+            write(frames, |at, value| scratch[at] = value);
+            out.set_region(env, offset, scratch)?;
             Ok(frames.len() as jint)
         })
     })

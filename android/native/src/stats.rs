@@ -19,7 +19,11 @@ fn stats<'l>(env: &mut Env<'l>, _: JClass<'l>, session: jlong) -> Outcome<JDoubl
 
 /// Counts below 2^53 are exact.
 fn row(s: &SessionStats) -> Vec<f64> {
-    let voice = |v: &VoiceStats| [v.underrun_samples as f64, v.overflow_samples as f64, v.clipped_samples as f64];
+    let voice = |v: &VoiceStats| {
+        let lost = [v.underrun_samples, v.overflow_samples, v.clipped_samples];
+        let refused = [v.non_finite_samples, v.bad_rate_samples, v.contended_samples];
+        lost.into_iter().chain(refused).map(|n| n as f64)
+    };
     let head = s.inputs.head;
     let mut row = vec![s.blocks as f64];
     row.extend(s.block_ms);

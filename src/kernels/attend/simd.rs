@@ -191,9 +191,14 @@ fn scores<L: F32x16, T: Stored, const R: usize, const N: usize>(
     t: usize,
 ) -> usize {
     let parts = head.dim / 16;
-    let keys: [&[[T; 16]]; N] =
-        std::array::from_fn(|i| &head.k[head.at(&rows[0], t + i)..][..head.dim].as_chunks().0[..parts]);
-    let queries: [&[[f32; 16]]; R] = std::array::from_fn(|r| &rows[r].q.as_chunks().0[..parts]);
+    let mut keys: [&[[T; 16]]; N] = [&[]; N];
+    let mut queries: [&[[f32; 16]]; R] = [&[]; R];
+    for i in 0..N {
+        keys[i] = head.k[head.at(&rows[0], t + i)..][..head.dim].as_chunks().0;
+    }
+    for r in 0..R {
+        queries[r] = rows[r].q[..head.dim].as_chunks().0;
+    }
     let mut acc = [[level.zero(); N]; R];
     for j in 0..parts {
         let mut k = [level.zero(); N];

@@ -12,10 +12,9 @@ pub(super) fn run(sums: Sums<'_>, bias: &[f32], finish: Finish<'_>, y: &mut [f32
     let mut t = [0.0f32; TILE_COLS];
     let t = &mut t[..n];
     match sums {
-        Sums::F32(sums, x_scale) => scale(sums, t, |sum| sum, |_| x_scale),
+        Sums::F32(sums, x_scale) => scale(sums, t, |sum| sum, std::iter::repeat(x_scale)),
         Sums::I32(sums, x_scale, w_scale) => {
-            let w_scale = &w_scale[..n];
-            scale(sums, t, |sum| sum as f32, |c| x_scale * w_scale[c]);
+            scale(sums, t, |sum| sum as f32, w_scale[..n].iter().map(|w| x_scale * w));
         }
     }
     for (t, b) in t.iter_mut().zip(&bias[..n]) {
@@ -43,17 +42,17 @@ pub(super) fn run(sums: Sums<'_>, bias: &[f32], finish: Finish<'_>, y: &mut [f32
 
 /// Sums as floats times the scale of their column.
 #[inline(always)]
-fn scale<T: Copy>(sums: RowSums<'_, T>, t: &mut [f32], to_f32: impl Fn(T) -> f32, of: impl Fn(usize) -> f32) {
+fn scale<T: Copy>(sums: RowSums<'_, T>, t: &mut [f32], to_f32: impl Fn(T) -> f32, scales: impl Iterator<Item = f32>) {
     let n = t.len();
     match sums {
         RowSums::Whole(sums) => {
-            for (c, (t, sum)) in t.iter_mut().zip(&sums[..n]).enumerate() {
-                *t = to_f32(*sum) * of(c);
+            for ((t, sum), scale) in t.iter_mut().zip(&sums[..n]).zip(scales) {
+                *t = to_f32(*sum) * scale;
             }
         }
         RowSums::Split([high, low]) => {
-            for (c, ((t, high), low)) in t.iter_mut().zip(&high[..n]).zip(&low[..n]).enumerate() {
-                *t = (BASE * to_f32(*high) + to_f32(*low)) * of(c);
+            for (((t, high), low), scale) in t.iter_mut().zip(&high[..n]).zip(&low[..n]).zip(scales) {
+                *t = (BASE * to_f32(*high) + to_f32(*low)) * scale;
             }
         }
     }

@@ -48,9 +48,10 @@ fn block<L: F32x16, W: Stored, const R: usize, const P: usize>(
             }
         }
     }
-    for (row, acc) in tile[from.0..].iter_mut().zip(acc) {
-        for (out, acc) in row.as_chunks_mut().0[from.1..].iter_mut().zip(acc) {
-            level.store(acc, out);
+    for r in 0..R {
+        let row = tile[from.0 + r].as_chunks_mut().0;
+        for c in 0..P {
+            level.store(acc[r][c], &mut row[from.1 + c]);
         }
     }
 }

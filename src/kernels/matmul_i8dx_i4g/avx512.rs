@@ -22,6 +22,7 @@ pub(super) fn run(job: &Job<'_>, tile: &mut Tile<f32>) {
 }
 
 /// Rows from `row`, panels from `p` of the job.
+#[inline(never)]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
 fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<f32>) {
     let (groups, panel, stride) = (job.geo.groups, job.geo.panel, job.x.stride);

@@ -21,6 +21,7 @@ pub(super) fn run(job: &Job<'_>, tile: &mut Tile<i32>) {
 }
 
 /// Rows `row .. row + R` of panel `p` of the job.
+#[inline(never)]
 #[target_feature(enable = "avx2")]
 fn block<const R: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<i32>) {
     let padded = job.geo.padded;

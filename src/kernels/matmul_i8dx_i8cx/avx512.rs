@@ -47,6 +47,7 @@ const FIRST: u8 = 0b01;
 const SECOND: u8 = 0b10;
 const ALL: u8 = FIRST | SECOND;
 
+#[inline(never)]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vnni")]
 fn block<const R: usize, const P: usize, const FETCH: u8>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<i32>) {
     let (padded, panel) = (job.geo.padded, job.geo.panel);

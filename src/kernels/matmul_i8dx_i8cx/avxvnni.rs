@@ -22,6 +22,7 @@ pub(super) fn run(job: &Job<'_>, tile: &mut Tile<i32>) {
 }
 
 /// Rows from `row`, panels from `p` of the job.
+#[inline(never)]
 #[target_feature(enable = "avx2,avxvnni")]
 fn block<const R: usize, const P: usize>(job: &Job<'_>, row: usize, p: usize, tile: &mut Tile<i32>) {
     let padded = job.geo.padded;

@@ -24,7 +24,8 @@ fn placed(recording: &Walk, frame: &Frame) -> Vec<Transform> {
     out
 }
 
-/// Positions off by `share` of the bone to the parent (standard deviation), rotations by `share` radians.
+/// Positions off by `share` of the bone to the parent (standard deviation), rotations by `share`
+/// radians.
 fn noisy(recording: &Walk, frame: &Frame, share: f32, noise: &mut Noise) -> Vec<Transform> {
     let jitter = |(j, t): (usize, &Transform)| {
         let scale = share * if j == 0 { 0.2 } else { recording.rig.offset(j).length() };
@@ -142,7 +143,8 @@ fn far_from_the_origin_the_heading_frame_keeps_precision() {
 
 #[test]
 fn a_nearly_straight_leg_does_not_pop() {
-    // Decoded 1 cm too short, the knee passing through the straight line: no jump, and no knee that juts out.
+    // Decoded 1 cm too short, the knee passing through the straight line: no jump, and no knee that
+    // juts out.
     let mut before: Option<Vec3> = None;
     for i in -50..=50 {
         let middle = Vec3::new(0.0, -0.405, i as f32 * 2e-4);

@@ -5,7 +5,8 @@ use glam::{Quat, Vec3};
 
 /// No leg is stretched further than this share of its length, unless it was decoded so.
 const REACH: f32 = 0.999;
-/// A knee nearer than this to the line from hip to ankle has no direction of its own, metres: `forward` takes over.
+/// A knee nearer than this to the line from hip to ankle has no direction of its own, metres:
+/// `forward` takes over.
 const STRAIGHT: f32 = 0.01;
 
 /// A leg put where it should be.
@@ -19,8 +20,9 @@ pub(super) struct Reach {
     pub(super) turns: [Quat; 2],
 }
 
-/// Moves the ankle of a leg (`hip`, `knee`, `ankle` as decoded) to `target`, bone lengths as they are. The knee keeps its side,
-/// swung along with the leg; a straight leg bends towards `forward`. `None` where a bone has no length.
+/// Moves the ankle of a leg (`hip`, `knee`, `ankle` as decoded) to `target`, bone lengths as they
+/// are. The knee keeps its side, swung along with the leg; a straight leg bends towards `forward`.
+/// `None` where a bone has no length.
 pub(super) fn reach([hip, knee, ankle]: [Vec3; 3], target: Vec3, forward: Vec3) -> Option<Reach> {
     let (upper, lower, far) = (knee.distance(hip), ankle.distance(knee), ankle.distance(hip));
     let from = (ankle - hip).try_normalize()?;
@@ -45,7 +47,8 @@ pub(super) fn reach([hip, knee, ankle]: [Vec3; 3], target: Vec3, forward: Vec3) 
     Some(Reach { knee: new_knee, ankle: new_ankle, turns })
 }
 
-/// The part of `v` at right angles to the unit vector `axis`, as a direction; zero where there is none.
+/// The part of `v` at right angles to the unit vector `axis`, as a direction; zero where there is
+/// none.
 fn across(v: Vec3, axis: Vec3) -> Vec3 {
     (v - v.dot(axis) * axis).normalize_or_zero()
 }

@@ -18,7 +18,8 @@ const MOST_TURNED: f32 = 0.4;
 pub(super) struct Leg {
     /// Hips, upper leg, lower leg, foot, toes.
     chain: [usize; 5],
-    /// How far the foot is from where it was decoded, `(x, z)` in the heading frame of the frame before, metres; about Y, radians.
+    /// How far the foot is from where it was decoded, `(x, z)` in the heading frame of the frame
+    /// before, metres; about Y, radians.
     moved: Vec2,
     twisted: f32,
     /// Heel and toes as shown, in the heading frame of the frame before.
@@ -45,8 +46,9 @@ impl Leg {
         self.shown = points;
     }
 
-    /// Moves the leg in `joints` so that a planted foot is shown where it was shown in the frame before. `before` and `now` are heel and
-    /// toes as decoded, each in the heading frame of its frame; `step`, corrected, lies between.
+    /// Moves the leg in `joints` so that a planted foot is shown where it was shown in the frame
+    /// before. `before` and `now` are heel and toes as decoded, each in the heading frame of its
+    /// frame; `step`, corrected, lies between.
     pub(super) fn hold(
         &mut self,
         joints: &mut [Transform],
@@ -80,7 +82,8 @@ impl Leg {
         self.shown = self.place(joints, target);
     }
 
-    /// Puts the ankle at `target` as far as the leg reaches, turns the foot, and tells where heel and toes are then.
+    /// Puts the ankle at `target` as far as the leg reaches, turns the foot, and tells where heel
+    /// and toes are then.
     fn place(&self, joints: &mut [Transform], target: Vec3) -> [Vec3; 2] {
         let [hips, upper, lower, foot, toes] = self.chain;
         let at = |j: usize| joints[j].position;

@@ -1,7 +1,7 @@
 //! Feet that stand stay where they are.
 //!
-//! The root's displacement and the joints around it are decoded apart, each with an error of its own, and a foot that
-//! should stand slides by the sum. Two corrections, in this order:
+//! The root's displacement and the joints around it are decoded apart, each with an error of its
+//! own, and a foot that should stand slides by the sum. Two corrections, in this order:
 //!
 //! | file | what |
 //! |---|---|
@@ -9,8 +9,8 @@
 //! | `legs` | what is left, since two feet do not agree on one root, is taken up by the legs: each planted foot keeps its place and direction on the floor |
 //! | `ik` | the leg that puts an ankle where it should be |
 //!
-//! A foot is planted as far as its lowest point, heel or toes, is near the floor and slow; both fade, so that nothing jumps when
-//! a foot lands or lifts. Feet below the floor are lifted onto it.
+//! A foot is planted as far as its lowest point, heel or toes, is near the floor and slow; both
+//! fade, so that nothing jumps when a foot lands or lifts. Feet below the floor are lifted onto it.
 
 mod ik;
 mod legs;
@@ -20,7 +20,8 @@ use super::Rig;
 use crate::frame::{FPS, Transform};
 use glam::{Vec2, Vec3};
 
-/// A foot this far above its height at rest is fully planted; above the second number it is not, metres.
+/// A foot this far above its height at rest is fully planted; above the second number it is not,
+/// metres.
 const HEIGHT: [f32; 2] = [0.015, 0.05];
 /// A foot this slow is fully planted; faster than the second number it swings, m/s.
 const SPEED: [f32; 2] = [0.25, 0.8];
@@ -54,7 +55,8 @@ struct Contact {
 }
 
 impl Stance {
-    /// For a rig; one without feet is left alone, one without whole legs has its root corrected only.
+    /// For a rig; one without feet is left alone, one without whole legs has its root corrected
+    /// only.
     pub(super) fn new(rig: &Rig) -> Self {
         let side = |name: &str| {
             let point = |joint: &str| {
@@ -76,8 +78,8 @@ impl Stance {
         }
     }
 
-    /// Takes a decoded frame, `joints` in its heading frame and its root's `step` `(vx, vz, dyaw)` in that of the frame before;
-    /// moves the legs of `joints` and returns the corrected step.
+    /// Takes a decoded frame, `joints` in its heading frame and its root's `step` `(vx, vz, dyaw)`
+    /// in that of the frame before; moves the legs of `joints` and returns the corrected step.
     pub(super) fn hold(&mut self, joints: &mut [Transform], step: [f32; 3]) -> [f32; 3] {
         let Some(sides) = &mut self.sides else { return step };
         let now = [0, 1].map(|s| sides[s].foot.points(joints));
@@ -112,13 +114,15 @@ impl Foot {
 }
 
 impl Contact {
-    /// How much a foot stands whose lowest point moved by `slide` (metres) over the floor in a frame, 0 to 1.
+    /// How much a foot stands whose lowest point moved by `slide` (metres) over the floor in a
+    /// frame, 0 to 1.
     fn planted(&self, slide: Vec2) -> f32 {
         fade(self.clearance[self.low], HEIGHT) * fade(slide.length() * FPS as f32, SPEED)
     }
 }
 
-/// The floor coordinates `(x, z)` of a point of this frame's heading frame, in that of the frame before; `step` lies between.
+/// The floor coordinates `(x, z)` of a point of this frame's heading frame, in that of the frame
+/// before; `step` lies between.
 fn earlier(p: Vec3, [vx, vz, dyaw]: [f32; 3]) -> Vec2 {
     turned(floor(p), dyaw) + Vec2::new(vx, vz)
 }
@@ -129,7 +133,8 @@ fn turned(p: Vec2, yaw: f32) -> Vec2 {
     Vec2::new(c * p.x + s * p.y, c * p.y - s * p.x)
 }
 
-/// The turn about Y from the direction `from` to the direction `to`, radians: positive yaw turns +Z towards +X.
+/// The turn about Y from the direction `from` to the direction `to`, radians: positive yaw turns +Z
+/// towards +X.
 fn turn(from: Vec2, to: Vec2) -> f32 {
     libm::atan2f(to.x * from.y - to.y * from.x, to.dot(from))
 }

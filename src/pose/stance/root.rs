@@ -3,9 +3,9 @@
 use super::{Contact, earlier, floor, turn};
 use glam::Vec3;
 
-/// The corrected step `(vx, vz, dyaw)` for a decoded one: turned so that the line between two planted feet keeps its direction,
-/// then moved so that their weighted mean stays. `before` and `now` are heel and toes of both feet, each in the heading frame of
-/// its frame.
+/// The corrected step `(vx, vz, dyaw)` for a decoded one: turned so that the line between two
+/// planted feet keeps its direction, then moved so that their weighted mean stays. `before` and
+/// `now` are heel and toes of both feet, each in the heading frame of its frame.
 pub(super) fn correct(
     contacts: &[Contact; 2],
     before: &[[Vec3; 2]; 2],

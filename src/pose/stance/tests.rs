@@ -10,7 +10,8 @@ const LEGS: [[&str; 4]; 2] = [
     ["rightUpperLeg", "rightLowerLeg", "rightFoot", "rightToes"],
 ];
 
-/// The rig at rest with slightly bent knees, feet (sole under the ankle) given in the heading frame: `[left, right]`.
+/// The rig at rest with slightly bent knees, feet (sole under the ankle) given in the heading
+/// frame: `[left, right]`.
 fn standing(rig: &Rig, feet: [Vec3; 2]) -> Vec<Transform> {
     let mut joints = vec![Transform::IDENTITY; rig.len()];
     rig.fk(rig.offset(0) - 0.02 * Vec3::Y, &vec![Quat::IDENTITY; rig.len()], &mut joints);
@@ -74,7 +75,8 @@ fn planted_feet_stay_though_the_decoded_root_slips() {
 fn one_planted_foot_holds_the_place() {
     let lifted = [Vec3::new(0.1, 0.0, 0.0), Vec3::new(-0.1, 0.3, 0.0)];
     let way = follow(&sway(100), |_| lifted);
-    // The heading is not known from one foot and drifts; the standing foot stays: its distance from the root does.
+    // The heading is not known from one foot and drifts; the standing foot stays: its distance from
+    // the root does.
     for (a, b) in way.iter().zip(&sway(100)) {
         let from = |r: &Root| (r.x - 0.1).hypot(r.z);
         assert!((from(a) - from(b)).abs() < 2e-3, "{a:?} {b:?}");
@@ -94,7 +96,8 @@ fn feet_in_the_air_or_swinging_say_nothing() {
     assert!((drift(swing) - 49.0 * 0.004).abs() < 1e-4, "3 m/s is no stance");
 }
 
-/// Frames of feet as decoded (heading frame, root still): what is shown of the ankles, in the world.
+/// Frames of feet as decoded (heading frame, root still): what is shown of the ankles, in the
+/// world.
 fn shown(frames: usize, feet: impl Fn(usize) -> [Vec3; 2]) -> Vec<[Vec3; 2]> {
     let rig = Rig::humanoid();
     let mut stance = Stance::new(&rig);
@@ -120,7 +123,7 @@ fn shown(frames: usize, feet: impl Fn(usize) -> [Vec3; 2]) -> Vec<[Vec3; 2]> {
 
 #[test]
 fn feet_that_drift_apart_are_held_by_the_legs() {
-    // 1 mm a frame each, to either side: no root can make up for that.
+    // 1 mm per frame each, to either side: no root can make up for that.
     let drift = |i: usize| 0.001 * i as f32;
     let way = shown(40, |i| [Vec3::new(0.1 + drift(i), 0.0, 0.0), Vec3::new(-0.1 - drift(i), 0.0, 0.0)]);
     for pair in way.windows(2) {

@@ -1,9 +1,9 @@
 //! The deadline governor: trades quality for time before a block would come too late.
 //!
-//! Quality is a ladder of samplers: 8 evaluations a block, 4, and the single-step student (without
-//! a student the ladder ends at `midpoint1`, 2 evaluations; with one, `midpoint1` is a rung only if
-//! asked for, since undistilled two evaluations make worse motion than the student's one). For
-//! every block the governor decides, from the times of the blocks before it,
+//! Quality is a ladder of samplers: 8 evaluations per block, 4, and the single-step student
+//! (without a student the ladder ends at `midpoint1`, 2 evaluations; with one, `midpoint1` is a
+//! rung only if asked for, since undistilled two evaluations make worse motion than the student's
+//! one). For every block the governor decides, from the times of the blocks before it,
 //!
 //! - which rung to use: one whose expected time is at most half the budget, so that a core that
 //!   suddenly runs at half speed, or a stall of half a budget, still misses nothing;
@@ -53,6 +53,17 @@ pub enum Governor {
     /// the next one. Before the first one, and where a decision's sampler is not supported, the
     /// session's sampler is used.
     Replay(Arc<[Decision]>),
+}
+
+impl Governor {
+    /// A governor with a budget of `milliseconds` a block, or none for 0: what languages without
+    /// this type pass.
+    pub fn within(milliseconds: f32) -> Self {
+        if milliseconds == 0.0 {
+            return Self::Off;
+        }
+        Self::Budget(Budget { milliseconds, ..Budget::default() })
+    }
 }
 
 /// What a governed session may spend.

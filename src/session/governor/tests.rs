@@ -47,7 +47,7 @@ impl Device {
         Self { policy: Policy::new(&budget, best, student), behind: [1; 5], times: Vec::new(), plans: Vec::new() }
     }
 
-    fn standard() -> Self {
+    fn typical() -> Self {
         Self::new(Budget { milliseconds: BUDGET as f32, coarse: false }, Sampler::Midpoint4, true)
     }
 
@@ -112,7 +112,7 @@ fn ladders() {
 
 #[test]
 fn a_fast_device_climbs_at_once_and_stays() {
-    let mut device = Device::standard();
+    let mut device = Device::typical();
     assert_eq!(device.block(0.3, 0.0).sampler, Sampler::Single);
     (0..500).for_each(|_| assert_eq!(device.block(0.3, 0.0).sampler, Sampler::Midpoint4));
     assert_eq!((device.missed(), device.policy.stats().down), (0, 0));
@@ -124,7 +124,7 @@ fn a_fast_device_climbs_at_once_and_stays() {
 #[test]
 fn a_permanent_half_speed_core_misses_nothing() {
     for start in [0, 1, 40, 333] {
-        let mut device = Device::standard();
+        let mut device = Device::typical();
         for block in 0..1500 {
             device.block(if block < start { 1.0 } else { 2.0 }, 0.0);
         }
@@ -138,7 +138,7 @@ fn a_permanent_half_speed_core_misses_nothing() {
 /// takes 52 ms then.
 #[test]
 fn heat_that_comes_and_goes_misses_nothing_and_is_climbed_out_of() {
-    let mut device = Device::standard();
+    let mut device = Device::typical();
     let slow = |block: usize| {
         let ramp = |from: usize| ((block.saturating_sub(from)) as f64 / 450.0).min(1.0);
         0.8 + 3.2 * (ramp(200) - ramp(1500))
@@ -158,7 +158,7 @@ fn heat_that_comes_and_goes_misses_nothing_and_is_climbed_out_of() {
 /// deadline is missed.
 #[test]
 fn single_stalls_cost_quality_for_seconds_and_no_deadline() {
-    let mut device = Device::standard();
+    let mut device = Device::typical();
     for block in 0..3000 {
         device.block(0.8, if block % 400 == 399 { 45.0 } else { 0.0 });
     }
@@ -172,7 +172,7 @@ fn single_stalls_cost_quality_for_seconds_and_no_deadline() {
 /// One stall of a second: that block is late, whatever anyone decides; motion is not held for it.
 #[test]
 fn one_long_stall_is_one_missed_deadline() {
-    let mut device = Device::standard();
+    let mut device = Device::typical();
     for block in 0..400 {
         device.block(0.8, if block == 200 { 1000.0 } else { 0.0 });
     }
@@ -182,7 +182,7 @@ fn one_long_stall_is_one_missed_deadline() {
 /// Too slow for the single step for a while: held, rehearsed, and back.
 #[test]
 fn what_cannot_keep_up_is_held_and_comes_back() {
-    let mut device = Device::standard();
+    let mut device = Device::typical();
     let slow = |block: usize| if (100..900).contains(&block) { 12.0 } else { 0.8 };
     for block in 0..1600 {
         device.block(slow(block), 0.0);
@@ -197,7 +197,7 @@ fn what_cannot_keep_up_is_held_and_comes_back() {
 
 #[test]
 fn cheaper_rungs_are_kept_ready() {
-    let mut device = Device::standard();
+    let mut device = Device::typical();
     for _ in 0..200 {
         device.block(0.5, 0.0);
         let last = device.policy.ladder().len() - 1;
@@ -213,7 +213,7 @@ proptest! {
     fn nothing_is_missed_where_the_single_step_fits(
         steps in prop::collection::vec((0.3f64..1.4, 1usize..60), 1..40),
     ) {
-        let mut device = Device::standard();
+        let mut device = Device::typical();
         let mut slow = 1.0;
         for (factor, blocks) in steps {
             // The governor's prices and the device's differ by a factor of 1.4 between rungs.

@@ -1,4 +1,5 @@
-//! Writes the viewer's page for a procedural person: `cargo run -p visavis-tools --example synthetic_person -- out.html`.
+//! Writes the viewer's page for a procedural person: `cargo run -p visavis-tools --example
+//! synthetic_person -- out.html`.
 
 mod person;
 

@@ -1,4 +1,5 @@
-//! A procedural person: sways, breathes, gestures while it speaks and turns to a user who approaches, circles and leaves.
+//! A procedural person: sways, breathes, gestures while it speaks and turns to a user who
+//! approaches, circles and leaves.
 //!
 //! No model is involved; it gives exporters and the viewer something to show.
 
@@ -114,7 +115,8 @@ pub fn recording(seconds: f32) -> Recording {
         let head = user(t);
         let wrap = |a: f32| a - TAU * (a / TAU).round();
         let bearing = wrap(head.x.atan2(head.z) - yaw);
-        // The body follows slowly and only when the neck no longer reaches; the head takes the rest.
+        // The body follows slowly and only when the neck no longer reaches; the head takes the
+        // rest.
         let aside = 0.35 * (t * 0.8).sin().max(0.0).powi(3) * (1.0 - 0.6 * speaking(t));
         let step = (bearing.abs() - 0.45).clamp(0.0, 0.5) * bearing.signum() * 0.09;
         yaw = wrap(yaw + step);
@@ -157,7 +159,8 @@ pub fn recording(seconds: f32) -> Recording {
     }
 }
 
-/// Bends the legs so that the ankles stand beside the root; while the body turns, the feet step in turns.
+/// Bends the legs so that the ankles stand beside the root; while the body turns, the feet step in
+/// turns.
 fn plant(rig: &Rig, hips: Vec3, yaw: f32, turning: f32, t: f32, local: &mut [Quat]) {
     for (side, leg, phase) in [(1.0_f32, 14, 0.0), (-1.0, 18, PI)] {
         let heading = Quat::from_rotation_y(yaw + side * 0.12);

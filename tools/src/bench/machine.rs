@@ -33,9 +33,11 @@ impl Machine {
     }
 }
 
-/// GB/s that `threads` threads get from memory, all together, with a plain loop over eight streams each: the median of seven.
+/// GB/s that `threads` threads get from memory, all together, with a plain loop over eight streams
+/// each: the median of seven.
 ///
-/// It is what this loop gets on this machine now, other load included, not what the memory could give.
+/// It is what this loop gets on this machine now, other load included, not what the memory could
+/// give.
 pub fn read_limit(threads: usize) -> f64 {
     let mut rates: Vec<f64> = std::thread::scope(|scope| {
         let workers: Vec<_> = (0..threads.max(1)).map(|_| scope.spawn(rates)).collect();
@@ -74,7 +76,8 @@ pub(super) fn reset_peak() {
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 
-/// Memory of this process that is resident now, and the most that was since its start, bytes, where the system tells.
+/// Memory of this process that is resident now, and the most that was since its start, bytes, where
+/// the system tells.
 pub fn memory() -> [Option<u64>; 2] {
     [resident(), peak_resident()]
 }

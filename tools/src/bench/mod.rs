@@ -1,16 +1,19 @@
 //! How fast a bundle runs here, and where the time goes.
 //!
 //! ```text
-//! Engine (a bundle, or seeded weights of a size) -> blocks of a made-up conversation -> block times, stages, bytes, memory -> Bench
+//! Engine (a bundle, or seeded weights of a size) -> blocks of a synthetic conversation -> block times, stages, bytes, memory -> Bench
 //! ```
 //!
-//! Speed does not depend on what weights hold, so sizes for which there is no trained bundle are measured with seeded ones
-//! ([`Size::engine`]). What a machine's memory gives is measured in the same run, because the time of a block is mostly that of reading weights.
+//! Speed does not depend on what weights hold, so sizes for which there is no trained bundle are
+//! measured with seeded ones ([`Size::engine`]). What a machine's memory gives is measured in the
+//! same run, because the time of a block is mostly that of reading weights.
 
+mod load;
 mod machine;
 mod sizes;
 mod stages;
 
+pub use load::{LoadOptions, Times, UnderLoad};
 pub use machine::{Machine, memory, read_limit};
 pub use sizes::Size;
 pub use stages::{STAGES, StageTimes};
@@ -38,7 +41,8 @@ pub struct BenchOptions {
     pub sessions: usize,
     /// Blocks that are timed.
     pub blocks: usize,
-    /// Counts the allocations of this process so far, where the program can: those of the timed blocks are reported.
+    /// Counts the allocations of this process so far, where the program can: those of the timed
+    /// blocks are reported.
     pub allocations: Option<fn() -> u64>,
 }
 
@@ -63,13 +67,15 @@ pub struct Bench {
     pub blocks: usize,
     /// Time of a block, of all sessions together: median, 95th and 99th percentile, longest.
     pub block_ms: [f64; 4],
-    /// Mean times of the stages of a block, of as many further blocks; `None` with several sessions.
+    /// Mean times of the stages of a block, of as many further blocks; `None` with several
+    /// sessions.
     pub stages: Option<StageTimes>,
     /// Frames a second at the median, of all sessions together.
     pub frames_per_second: f64,
     /// Seconds of motion a second at the median, of each session.
     pub real_time_factor: f64,
-    /// Blocks of sessions that shared passes over the weights with another session's, a block of all.
+    /// Blocks of sessions that shared passes over the weights with another session's, a block of
+    /// all.
     pub shared_blocks: f64,
     /// Bytes of packed weights that a block of one session reads.
     pub weight_bytes_a_block: usize,
@@ -87,9 +93,11 @@ pub struct Bench {
     pub weight_bytes: usize,
     /// Bytes of the sessions' caches.
     pub cache_bytes: usize,
-    /// Memory of this process that is resident after the timed blocks, bytes, where the system tells.
+    /// Memory of this process that is resident after the timed blocks, bytes, where the system
+    /// tells.
     pub resident_bytes: Option<u64>,
-    /// The most that was, from the making of the sessions on (where the system does not let the peak be reset: of the process).
+    /// The most that was, from the making of the sessions on (where the system does not let the
+    /// peak be reset: of the process).
     pub peak_resident_bytes: Option<u64>,
 }
 
@@ -158,7 +166,7 @@ impl Bench {
     }
 }
 
-/// Sessions in a made-up conversation each: two voices, a user who circles.
+/// Sessions in a synthetic conversation each: two voices, a user who circles.
 struct Talks {
     sessions: Vec<Session>,
     team: Option<Team>,
@@ -192,7 +200,8 @@ impl Talks {
         Ok(())
     }
 
-    /// Computes the next block of all; the time that it took, and by how much `count` went up. Only a session by itself has a probe.
+    /// Computes the next block of all; the time that it took, and by how much `count` went up. Only
+    /// a session by itself has a probe.
     fn compute(&mut self, probe: Option<&mut StageTimes>, count: fn() -> u64) -> Result<(Duration, u64)> {
         if let Some(team) = &mut self.team {
             let mut due: Vec<_> = (self.sessions.iter_mut())

@@ -13,6 +13,8 @@ use visavis::{Engine, Error, ErrorKind, Joint, Networks, Result, Rig};
 pub enum Size {
     /// SARAH's: flow 4 x 1024, autoencoder 9 x 256, 127 joints.
     Paper,
+    /// Between the two: flow 6 x 512, autoencoder 4 x 256, 22 joints; audio features 96 wide.
+    Mid,
     /// The shipped one's: flow 4 x 256, autoencoder 4 x 192, 22 joints.
     Base,
 }
@@ -23,14 +25,16 @@ impl std::str::FromStr for Size {
     fn from_str(s: &str) -> Result<Self> {
         match s {
             "paper" => Ok(Self::Paper),
+            "mid" => Ok(Self::Mid),
             "base" => Ok(Self::Base),
-            _ => Err(Error::new(ErrorKind::Argument, format!("unknown size {s:?}: paper or base"))),
+            _ => Err(Error::new(ErrorKind::Argument, format!("unknown size {s:?}: paper, mid or base"))),
         }
     }
 }
 
 impl Size {
-    /// An engine of this size whose weights are drawn from a seed and stored as `scheme`; its motion means nothing. There is a student.
+    /// An engine of this size whose weights are drawn from a seed and stored as `scheme`; its
+    /// motion means nothing. There is a student.
     ///
     /// # Errors
     /// None for these sizes; those of [`Engine::from_file`] if they were not sound.
@@ -46,7 +50,8 @@ impl Size {
         Engine::from_tensors(self.config(), &Tensors::seeded(scheme), kernels, networks)
     }
 
-    /// The bytes of a bundle with the weights of [`Size::engine`]: what loading takes can be measured on it.
+    /// The bytes of a bundle with the weights of [`Size::engine`]: what loading takes can be
+    /// measured on it.
     ///
     /// # Errors
     /// As [`Size::engine`].
@@ -58,14 +63,19 @@ impl Size {
 
     fn config(self) -> Config {
         let rig = Rig::humanoid();
-        let (name, rig, vae, flow) = match self {
+        let (name, rig, vae, flow, audio) = match self {
             Self::Paper => {
                 let vae = VaeConfig { layers: 9, width: 256, heads: 4, mlp: 4, latent: 256, window_blocks: 16 };
-                ("paper size, seeded", with_joints(rig, 127), vae, flow(1024, 100))
+                ("paper size, seeded", with_joints(rig, 127), vae, flow(1024, 100), audio(BASE_CHANNELS, 64))
+            }
+            Self::Mid => {
+                let vae = VaeConfig { layers: 4, width: 256, heads: 4, mlp: 4, latent: 64, window_blocks: 16 };
+                let flow = FlowConfig { layers: 6, heads: 8, tau_width: 128, embed_user: 64, ..flow(512, 48) };
+                ("mid size, seeded", rig, vae, flow, audio([32, 64, 128, 192, 320, 320, 320], 96))
             }
             Self::Base => {
                 let vae = VaeConfig { layers: 4, width: 192, heads: 4, mlp: 4, latent: 64, window_blocks: 16 };
-                ("base size, seeded", rig, vae, flow(256, 48))
+                ("base size, seeded", rig, vae, flow(256, 48), audio(BASE_CHANNELS, 64))
             }
         };
         Config {
@@ -77,7 +87,7 @@ impl Size {
             agent_delay_blocks: 0,
             rig,
             pose: PoseConfig { radius: 0.1 },
-            audio: audio(),
+            audio,
             vae,
             flow,
             student: Some(StudentConfig { tau_history: 0.9, guidance: 2.0, gaze_guidance: 1.5 }),
@@ -87,7 +97,8 @@ impl Size {
                 temperature: 0.75,
                 clean_history: None,
                 bridge: 0.8,
-                // A round takes about a window of blocks; between two of them there are blocks without.
+                // A round takes about a window of blocks; between two of them there are blocks
+                // without.
                 anchor_period: 4 * flow.window_blocks as u32,
                 // The motion of seeded weights goes anywhere: where to says nothing.
                 anchor_radius: 1e6,
@@ -114,22 +125,19 @@ fn flow(width: usize, window_blocks: usize) -> FlowConfig {
     }
 }
 
-/// The shipped model's encoder, 0.75 M parameters.
-fn audio() -> AudioConfig {
-    let layers = [
-        (1, 24, 10, 5),
-        (24, 48, 10, 5),
-        (48, 96, 8, 4),
-        (96, 160, 8, 4),
-        (160, 256, 4, 2),
-        (256, 256, 3, 1),
-        (256, 256, 3, 1),
-    ];
-    let layer = |(inputs, outputs, kernel, stride)| {
-        let residual = stride == 1;
-        ConvConfig { inputs, outputs, kernel, stride, residual }
+/// Channels of the shipped model's encoder, 0.75 M parameters.
+const BASE_CHANNELS: [usize; 7] = [24, 48, 96, 160, 256, 256, 256];
+
+/// The encoder with these channels after each convolution.
+fn audio(channels: [usize; 7], features: usize) -> AudioConfig {
+    let shapes = [(10, 5), (10, 5), (8, 4), (8, 4), (4, 2), (3, 1), (3, 1)];
+    let mut inputs = 1;
+    let layer = |((kernel, stride), outputs)| {
+        let layer = ConvConfig { inputs, outputs, kernel, stride, residual: stride == 1 };
+        inputs = outputs;
+        layer
     };
-    AudioConfig { layers: layers.map(layer).to_vec(), features: 64 }
+    AudioConfig { layers: shapes.into_iter().zip(channels).map(layer).collect(), features }
 }
 
 /// The rig with further joints at the hands until there are `count`.

@@ -7,7 +7,8 @@ use visavis::internals::session::Probe;
 /// Names of the stages, in the order of the data flow.
 pub const STAGES: [&str; 4] = ["audio", "flow", "decoder", "pose"];
 
-/// Times of the stages of blocks, milliseconds. The probe's own work (copying a few kilobytes for each stage) is in them.
+/// Times of the stages of blocks, milliseconds. The probe's own work (copying a few kilobytes for
+/// each stage) is in them.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct StageTimes {
     /// Both voices and the user's place.

@@ -34,6 +34,24 @@ fn several_sessions_are_stepped_together() {
 }
 
 #[test]
+fn one_and_two_threads_take_turns_beside_other_work() {
+    let engine = Engine::load(concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/goldens/tiny.safetensors")).unwrap();
+    let options = LoadOptions { sampler: Sampler::Single, load: 2, every: Duration::from_millis(1), blocks: 30 };
+    let measured = UnderLoad::run(&engine, options).unwrap();
+    assert_eq!((measured.load, measured.blocks, measured.every_ms), (2, 30, 1.0));
+    for times in measured.block_ms {
+        let [mean, p50, p95, p99, max] = times.named().map(|(_, ms)| ms);
+        assert!(0.0 < p50 && p50 <= p95 && p95 <= p99 && p99 <= max && mean <= max, "{times:?}");
+    }
+    assert_eq!(
+        Times::of(&mut [4, 1, 3, 2].map(Duration::from_millis)).named().map(|(_, ms)| ms),
+        [2.5, 2.0, 4.0, 4.0, 4.0]
+    );
+    let none = LoadOptions { blocks: 0, ..options };
+    assert_eq!(UnderLoad::run(&engine, none).unwrap_err().kind(), ErrorKind::Argument);
+}
+
+#[test]
 fn seeded_sizes_run_quantised() {
     let kernels = Kernels::detect().unwrap();
     let bytes: Vec<_> = [Scheme::F16, Scheme::I8]
@@ -51,5 +69,6 @@ fn seeded_sizes_run_quantised() {
 #[test]
 fn sizes_have_names() {
     assert_eq!("paper".parse::<Size>().unwrap(), Size::Paper);
+    assert_eq!("mid".parse::<Size>().unwrap(), Size::Mid);
     assert!("huge".parse::<Size>().unwrap_err().to_string().contains("paper or base"));
 }

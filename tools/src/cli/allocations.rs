@@ -1,4 +1,5 @@
-//! The system's allocator, counting what is asked of it: `visavis soak` proves with it that computing blocks asks for nothing.
+//! The system's allocator, counting what is asked of it: `visavis soak` proves with it that
+//! computing blocks asks for nothing.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -38,7 +39,8 @@ unsafe impl GlobalAlloc for Counting {
 
     unsafe fn realloc(&self, ptr: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         CALLS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: `ptr` came from `System` with this layout; the caller keeps the contract of `realloc`.
+        // SAFETY: `ptr` came from `System` with this layout; the caller keeps the contract of
+        // `realloc`.
         unsafe { System.realloc(ptr, layout, size) }
     }
 }

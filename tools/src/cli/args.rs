@@ -7,9 +7,11 @@ use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use visavis::{Engine, Sampler, SessionOptions};
 
-/// A body for a virtual agent: hears both voices, sees the user's head, moves at 30 frames a second.
+/// A body for a virtual agent: hears both voices, sees the user's head, moves at 30 frames per
+/// second.
 ///
-/// Without a command it runs the demo. VISAVIS_CPU=LEVEL forces the kernels of a CPU level (scalar, avx2, ...).
+/// Without a command it runs the demo. VISAVIS_CPU=LEVEL forces the kernels of a CPU level (scalar,
+/// avx2, ...).
 #[derive(Debug, Parser)]
 #[command(name = "visavis", version)]
 pub struct Cli {
@@ -31,7 +33,8 @@ pub enum Command {
     Report(ReportArgs),
     /// Measures how fast a bundle, or a network of a size, runs here, and where the time goes
     Bench(super::bench::BenchArgs),
-    /// Judges a bundle on recorded conversations: motion, gaze, reaction, endurance, against targets
+    /// Judges a bundle on recorded conversations: motion, gaze, reaction, endurance, against
+    /// targets
     Eval(super::eval::EvalArgs),
     /// Measures what a bundle's gaze channel does, so that gaze targets are what they say
     Calibrate(super::calibrate::CalibrateArgs),
@@ -47,7 +50,8 @@ pub struct Gaze(pub Option<f32>);
 
 #[derive(Debug, Clone, Args)]
 pub struct RunArgs {
-    /// How much the agent looks at the user, 0 (averted) to 1 (sustained eye contact), or off for what comes naturally
+    /// How much the agent looks at the user, 0 (averted) to 1 (sustained eye contact), or off for
+    /// what comes naturally
     #[arg(long, value_name = "0..1|off", value_parser = gaze, default_value = "off", allow_negative_numbers = true)]
     pub gaze: Gaze,
     /// midpoint4, midpoint2, midpoint1, euler:N or single
@@ -59,7 +63,8 @@ pub struct RunArgs {
     /// Gaze guidance weight, 0 to 20 [default: the model's]
     #[arg(long, value_name = "W", value_parser = weight, allow_negative_numbers = true)]
     pub gaze_guidance: Option<f32>,
-    /// Bundle [default: the shipped one, in models/ here, beside the program, or in its source folder]
+    /// Bundle [default: the shipped one, in models/ here, beside the program, or in its source
+    /// folder]
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
     /// Seed of the noise: same seed and inputs, same motion
@@ -88,8 +93,8 @@ pub struct GenerateArgs {
     /// The user's voice, likewise
     #[arg(long, value_name = "WAV")]
     pub user: Option<PathBuf>,
-    /// Path of the user's head: CSV with the header t,x,y,z; seconds and metres, any rate. The agent starts at the
-    /// origin of that world, on the floor y = 0, facing +z
+    /// Path of the user's head: CSV with the header t,x,y,z; seconds and metres, any rate. The
+    /// agent starts at the origin of that world, on the floor y = 0, facing +z
     #[arg(long, value_name = "CSV")]
     pub user_path: Option<PathBuf>,
     #[command(flatten)]
@@ -114,8 +119,8 @@ pub struct TraceArgs {
     /// Bundle
     #[arg(long, value_name = "FILE")]
     pub model: PathBuf,
-    /// Conditioning and noise, safetensors: agent_voice, user_voice `[N]` at 24 kHz; user_path `[T,3]`; gaze `[1]`;
-    /// eps `[K,Dz]` with eps_idle `[M,Dz]`. Each may be left out
+    /// Conditioning and noise, safetensors: agent_voice, user_voice `[N]` at 24 kHz; user_path
+    /// `[T,3]`; gaze `[1]`; eps `[K,Dz]` with eps_idle `[M,Dz]`. Each may be left out
     #[arg(long, value_name = "FILE")]
     pub input: PathBuf,
     /// Where the stages go, safetensors

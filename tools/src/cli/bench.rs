@@ -5,16 +5,18 @@ use super::{allocations, files, print};
 use clap::Args;
 use std::fmt::Write;
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
 use visavis::internals::kernels::{Kernels, Scheme};
 use visavis::{BundleFile, Engine, Networks, Result, Sampler};
-use visavis_tools::bench::{Bench, BenchOptions, Machine, STAGES, Size};
+use visavis_tools::bench::{Bench, BenchOptions, LoadOptions, Machine, STAGES, Size, UnderLoad};
 
 #[derive(Debug, Args)]
 pub struct BenchArgs {
     /// Bundle [default: the shipped one]
     #[arg(long, value_name = "FILE", conflicts_with = "size")]
     pub model: Option<PathBuf>,
-    /// Seeded weights of a size instead of a bundle: paper or base
+    /// Seeded weights of a size instead of a bundle: paper, mid or base
     #[arg(long, value_name = "SIZE")]
     pub size: Option<Size>,
     /// How the weights of --size are stored: f32, f16, i8 or i4
@@ -23,7 +25,8 @@ pub struct BenchArgs {
     /// midpoint4, midpoint2, midpoint1, euler:N or single, or several: midpoint4,single
     #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',', default_values = ["midpoint4", "single"])]
     pub sampler: Vec<Sampler>,
-    /// Networks to load: all, or those that the samplers need and no encoder, so no re-anchoring (lean)
+    /// Networks to load: all, or those that the samplers need and no encoder, so no re-anchoring
+    /// (lean)
     #[arg(long, value_name = "SET", default_value = "all")]
     pub networks: NetworkSet,
     /// Threads, 1 or 2, or both one after the other: 1,2
@@ -35,10 +38,19 @@ pub struct BenchArgs {
     /// Blocks that are timed
     #[arg(long, value_name = "N", default_value = "200", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=1_000_000))]
     pub blocks: usize,
+    /// Measures beside N threads that do nothing but compute, with one thread and with two in
+    /// turns: these times alone. Or several numbers one after the other: 0,1,2
+    #[arg(long, value_name = "N", num_args = 1.., value_delimiter = ',', value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(0..=64), conflicts_with_all = ["threads", "sessions"])]
+    pub load: Vec<usize>,
+    /// With --load: milliseconds from one block's start to the next's, at least; a conversation's
+    /// are 133.3
+    #[arg(long, value_name = "MS", default_value = "0", requires = "load", value_parser = milliseconds)]
+    pub every: f64,
     /// Leaves out the cold start, for which processes of their own load the bundle
     #[arg(long)]
     pub no_cold_start: bool,
-    /// What the cold start is measured by: loads, makes the first frame, says so, goes on for the blocks
+    /// What the cold start is measured by: loads, makes the first frame, says so, goes on for the
+    /// blocks
     #[arg(long, hide = true, requires = "model")]
     pub child: bool,
     /// Prints JSON: the machine, the kernels, a list of measurements
@@ -94,6 +106,9 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     let (machine, kernels) = (Machine::here(), engine.kernels());
     let mut benches = Vec::new();
     let allocations: Option<fn() -> u64> = Some(allocations::count);
+    if !args.load.is_empty() {
+        return under_load(args, &engine, &machine);
+    }
     for &sampler in &args.sampler {
         for &threads in &args.threads {
             for &sessions in &args.sessions {
@@ -131,7 +146,41 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     print(&text)
 }
 
-/// The cold start with each sampler and number of threads; the inner error where no process could be started.
+fn milliseconds(text: &str) -> std::result::Result<f64, String> {
+    let ms = text.parse().map_err(|_| "not a number".to_owned())?;
+    if (0.0..=10_000.0).contains(&ms) { Ok(ms) } else { Err("0 to 10000".to_owned()) }
+}
+
+/// Prints the times beside other work.
+fn under_load(args: &BenchArgs, engine: &Arc<Engine>, machine: &Machine) -> Result<()> {
+    let mut all = Vec::new();
+    for &sampler in &args.sampler {
+        for &load in &args.load {
+            let every = Duration::from_secs_f64(args.every / 1000.0);
+            all.push(UnderLoad::run(engine, LoadOptions { sampler, load, every, blocks: args.blocks })?);
+        }
+    }
+    if args.json {
+        return print(&format!("{:#}\n", serde_json::json!({ "machine": machine, "under_load": all })));
+    }
+    let mut text = format!("{} ({} processors), {}\n", machine.cpu, machine.processors, engine.config().name);
+    for UnderLoad { sampler, load, block_ms: [one, two], .. } in &all {
+        let _ = writeln!(text, "\n{sampler} beside {load} busy thread{}", if *load == 1 { "" } else { "s" });
+        let mut line = |name: &str, times: [(&str, f64); 5], unit: &str| {
+            let times = times.map(|(name, value)| format!("{name} {value:.2}"));
+            let _ = writeln!(text, "  {name:<9} {}{unit}", times.join(", "));
+        };
+        line("1 thread", one.named(), " ms");
+        line("2 threads", two.named(), " ms");
+        let mut ratios = two.named();
+        ratios.iter_mut().zip(one.named()).for_each(|((_, two), (_, one))| *two /= one);
+        line("2 to 1", ratios, "");
+    }
+    print(&text)
+}
+
+/// The cold start with each sampler and number of threads; the inner error where no process could
+/// be started.
 fn cold_starts(args: &BenchArgs) -> Result<std::io::Result<Vec<ColdStart>>> {
     let file = match args.size {
         Some(size) => cold_start::File::drawn(size, args.scheme)?,

@@ -24,7 +24,8 @@ pub struct CalibrateArgs {
     /// Clips in the format of the training corpus, best its validation split: a folder or one file
     #[arg(long, value_name = "DIR|FILE")]
     pub clips: PathBuf,
-    /// Most windows of 13.3 s, spread over the clips, that the model is tried on; free gaze takes after all that the clips have
+    /// Most windows of 13.3 s, spread over the clips, that the model is tried on; free gaze takes
+    /// after all that the clips have
     #[arg(long, value_name = "N", default_value = "32", value_parser = RangedU64ValueParser::<usize>::new().range(1..=100_000))]
     pub windows: usize,
     /// Threads, each on windows of its own; the result is the same

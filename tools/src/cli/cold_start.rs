@@ -1,4 +1,5 @@
-//! Cold start and memory, from outside: a process of its own that loads a bundle, makes a frame, and goes on for a while.
+//! Cold start and memory, from outside: a process of its own that loads a bundle, makes a frame,
+//! and goes on for a while.
 
 use serde::Serialize;
 use std::io::{BufRead, BufReader, Error, Result};
@@ -12,7 +13,8 @@ use visavis_tools::export::write_atomically;
 
 use super::bench::{BenchArgs, NetworkSet};
 
-/// Processes that are started one after the other; one more before them, which brings the file into the system's cache, is not counted.
+/// Processes that are started one after the other; one more before them, which brings the file into
+/// the system's cache, is not counted.
 const RUNS: usize = 5;
 /// What a process says on its first frame.
 const FRAME: &str = "first frame";

@@ -8,7 +8,7 @@ use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::sync::Mutex;
 use visavis::{Engine, Result, Sampler, SessionOptions};
-use visavis_tools::eval::{Clip, EvalOptions, EvalProgress, evaluate, made_up};
+use visavis_tools::eval::{Clip, EvalOptions, EvalProgress, evaluate, synthetic};
 use visavis_tools::export::write_atomically;
 
 #[derive(Debug, Args)]
@@ -16,11 +16,12 @@ pub struct EvalArgs {
     /// Bundle [default: the shipped one]
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
-    /// Clips in the format of the training corpus: a folder or one file [default: a procedural person in the sample
-    /// conversation, good for a look only]
+    /// Clips in the format of the training corpus: a folder or one file [default: a procedural
+    /// person in the sample conversation, good for a look only]
     #[arg(long, value_name = "DIR|FILE")]
     pub clips: Option<PathBuf>,
-    /// Clips that Random and NN look up their motion in, best those of training [default: the other clips]
+    /// Clips that Random and NN look up their motion in, best those of training [default: the other
+    /// clips]
     #[arg(long, value_name = "DIR")]
     pub bank: Option<PathBuf>,
     /// Most windows of 13.3 s, spread over the clips [default: 64; 4 with --quick]
@@ -87,7 +88,7 @@ pub fn run(args: &EvalArgs) -> Result<()> {
     let rig = &engine.config().rig;
     let clips = match &args.clips {
         Some(path) => Clip::list(path, rig)?,
-        None => made_up(rig, &files::conversation()?),
+        None => synthetic(rig, &files::conversation()?),
     };
     let bank = args.bank.as_ref().map(|path| Clip::list(path, rig)).transpose()?;
     let stage = Mutex::new(String::new());

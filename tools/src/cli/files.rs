@@ -39,7 +39,8 @@ pub fn apart(input: &Path, output: &Path) -> Result<()> {
     Err(Error::new(ErrorKind::Argument, message).with_path(output))
 }
 
-/// Looks for `relative` in the current folder, beside the program, and where the program was built; else what was tried.
+/// Looks for `relative` in the current folder, beside the program, and where the program was built;
+/// else what was tried.
 fn shipped(relative: &str) -> Result<PathBuf, Vec<PathBuf>> {
     let beside = std::env::current_exe().ok().and_then(|exe| Some(exe.parent()?.join(relative)));
     let built = Path::new(env!("CARGO_MANIFEST_DIR")).parent().map(|repository| repository.join(relative));

@@ -22,13 +22,16 @@ pub struct QuantizeArgs {
     /// f16, i8 or i4
     #[arg(long, value_name = "SCHEME")]
     pub scheme: Scheme,
-    /// Layers that stay floats, f16 unless told otherwise; `*` stands for any characters, the last pattern that fits decides
+    /// Layers that stay floats, f16 unless told otherwise; `*` stands for any characters, the last
+    /// pattern that fits decides
     #[arg(long, value_name = "PATTERN[=f16|f32]")]
     pub keep: Vec<Keep>,
-    /// Rounds each weight to the nearest value, instead of so that outputs on the sample conversation lose least
+    /// Rounds each weight to the nearest value, instead of so that outputs on the sample
+    /// conversation lose least
     #[arg(long)]
     pub plain: bool,
-    /// Raises the layers that hurt most until blocks of the sample conversation are within this mean joint error, millimetres
+    /// Raises the layers that hurt most until blocks of the sample conversation are within this
+    /// mean joint error, millimetres
     #[arg(long, value_name = "BUDGET_MM", value_parser = millimetres, allow_negative_numbers = true)]
     pub auto: Option<f64>,
 }

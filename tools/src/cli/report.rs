@@ -23,7 +23,8 @@ pub struct ReportArgs {
     /// Length of the free runs, minutes
     #[arg(long, value_name = "N", default_value_t = 10.0, value_parser = minutes, allow_negative_numbers = true)]
     pub minutes: f64,
-    /// Blocks that are compared teacher-forced [default: 240, as many as the sample conversation has]
+    /// Blocks that are compared teacher-forced [default: 240, as many as the sample conversation
+    /// has]
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<u32>::new().range(1..=10_000))]
     pub blocks: Option<u32>,
     /// What `visavis eval --json` wrote for the reference and for each candidate, on the same clips

@@ -20,7 +20,8 @@ pub struct SoakArgs {
     /// Prints JSON
     #[arg(long)]
     pub json: bool,
-    /// Bundle [default: models/visavis-base-i8.safetensors here, beside the program, or in its source folder]
+    /// Bundle [default: models/visavis-base-i8.safetensors here, beside the program, or in its
+    /// source folder]
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
     /// Best sampler; the student takes a part of each ten minutes if there is one

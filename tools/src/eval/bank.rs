@@ -1,4 +1,5 @@
-//! Motion that is looked up instead of generated: SARAH's Random and NN (nearest neighbour) baselines.
+//! Motion that is looked up instead of generated: SARAH's Random and NN (nearest neighbour)
+//! baselines.
 
 use super::clip::{Clip, Segment};
 use super::window::{WINDOW, Window};
@@ -25,8 +26,8 @@ pub struct Bank {
 }
 
 impl Bank {
-    /// A library of at most 2,048 stretches of 400 frames spread evenly over `clips`; `own` tells that they are the test clips
-    /// themselves.
+    /// A library of at most 2,048 stretches of 400 frames spread evenly over `clips`; `own` tells
+    /// that they are the test clips themselves.
     ///
     /// # Errors
     /// Those of [`Clip::read`].
@@ -54,7 +55,8 @@ impl Bank {
         self.stretches.is_empty()
     }
 
-    /// Any stretch, the same for the same `number`, put where the window's agent stands; `None` when there is none.
+    /// Any stretch, the same for the same `number`, put where the window's agent stands; `None`
+    /// when there is none.
     ///
     /// # Errors
     /// Those of [`Clip::read`].
@@ -65,10 +67,11 @@ impl Bank {
         of_others.get(at).map(|s| self.place(s, window)).transpose()
     }
 
-    /// The stretch whose voices and user are most like the window's, put where the window's agent stands.
+    /// The stretch whose voices and user are most like the window's, put where the window's agent
+    /// stands.
     ///
-    /// The distance is the mean of squares over values three times a second: the level of both voices, and where the user is as the agent
-    /// sees it at the start.
+    /// The distance is the mean of squares over values three times per second: the level of both
+    /// voices, and where the user is as the agent sees it at the start.
     ///
     /// # Errors
     /// Those of [`Clip::read`].
@@ -89,7 +92,7 @@ impl Bank {
     }
 }
 
-/// What was heard and seen: two levels and two coordinates, three times a second.
+/// What was heard and seen: two levels and two coordinates, three times per second.
 fn key(segment: &Segment) -> Vec<f64> {
     let level = |voice: Option<Vec<f32>>| -> Vec<f64> {
         let levels = envelope(&voice.unwrap_or_default(), segment.frames.len());

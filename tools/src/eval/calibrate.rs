@@ -16,15 +16,18 @@ const CHANNEL: [f32; 7] = [-0.6, -0.3, 0.0, 0.25, 0.5, 0.75, 1.0];
 /// Evenly spaced quantiles of the clips' gaze that are kept.
 const LEVELS: usize = 17;
 
-/// Measures a model's gaze as a function of its gaze channel, on at most `windows` windows of `clips` and `threads` threads, and the gaze
-/// of the clips' own agents on all their windows (of conversations it takes a hundred to tell their mean within 0.03). Best on clips that were not trained on; the figures of `visavis eval` are then taken on others again.
+/// Measures a model's gaze as a function of its gaze channel, on at most `windows` windows of
+/// `clips` and `threads` threads, and the gaze of the clips' own agents on all their windows (of
+/// conversations it takes a hundred to tell their mean within 0.03). Best on clips that were not
+/// trained on; the figures of `visavis eval` are then taken on others again.
 ///
-/// The result is for the bundle's default guidance; it goes into the bundle's config ([`visavis::internals::config::Config::gaze`]), and
-/// sessions follow it unless told otherwise ([`GazeControl`]). What the config holds so far makes no difference.
+/// The result is for the bundle's default guidance; it goes into the bundle's config
+/// ([`visavis::internals::config::Config::gaze`]), and sessions follow it unless told otherwise
+/// ([`GazeControl`]). What the config holds so far makes no difference.
 ///
 /// # Errors
-/// Those of [`Clip::read`], [`Window::choose`] and of sessions; [`ErrorKind::Argument`] for clips without users, and for a model
-/// whose gaze does not follow its channel.
+/// Those of [`Clip::read`], [`Window::choose`] and of sessions; [`ErrorKind::Argument`] for clips
+/// without users, and for a model whose gaze does not follow its channel.
 pub fn calibrate(
     engine: &Arc<Engine>,
     clips: &[Clip],
@@ -88,8 +91,9 @@ fn quantiles(values: &[f32]) -> Vec<f32> {
     (0..LEVELS).map(quantile).collect()
 }
 
-/// A curve that ascends, from points by ascending channel value: neighbours that do not ascend are pooled (isotonic regression
-/// by pool adjacent violators, Ayer et al. 1955), and a pool enters as one point.
+/// A curve that ascends, from points by ascending channel value: neighbours that do not ascend are
+/// pooled (isotonic regression by pool adjacent violators, Ayer et al. 1955), and a pool enters as
+/// one point.
 fn ascending(points: &[[f32; 2]], name: &str) -> Result<GazeCurve> {
     let mut pools: Vec<([f32; 2], f32)> = Vec::new();
     for point in points {

@@ -1,6 +1,6 @@
 //! Clips of recorded conversation, in the format that training uses.
 //!
-//! One safetensors file a clip (`training/visavis_train/corpus/store.py`):
+//! One safetensors file per clip (`training/visavis_train/corpus/store.py`):
 //!
 //! | tensor | shape | what |
 //! |---|---|---|
@@ -23,7 +23,8 @@ use visavis::{Error, ErrorKind, FPS, Frame, Result, Rig, Root, Transform};
 /// Longest header that is read, bytes.
 const MAX_HEADER: u64 = 1 << 20;
 
-/// A clip, on disk or in memory. Of a file the header has been read and checked; its data is read in parts.
+/// A clip, on disk or in memory. Of a file the header has been read and checked; its data is read
+/// in parts.
 #[derive(Debug, Clone)]
 pub struct Clip {
     path: PathBuf,
@@ -50,7 +51,7 @@ pub struct Segment {
     pub frames: Vec<Frame>,
     /// The user's head at each frame, metres.
     pub user: Vec<Vec3>,
-    /// The agent's voice, 24 kHz mono, 800 samples a frame; `None` where absent.
+    /// The agent's voice, 24 kHz mono, 800 samples per frame; `None` where absent.
     pub agent_voice: Option<Vec<i16>>,
     /// The user's voice, likewise.
     pub user_voice: Option<Vec<i16>>,
@@ -60,7 +61,8 @@ impl Clip {
     /// Opens a clip whose bodies have the joints of `rig`.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`] when it cannot be read, [`ErrorKind::Argument`] when it is not a clip, each naming the file.
+    /// [`ErrorKind::Io`] when it cannot be read, [`ErrorKind::Argument`] when it is not a clip,
+    /// each naming the file.
     pub fn open(path: impl AsRef<Path>, rig: &Rig) -> Result<Self> {
         let path = path.as_ref();
         let mut header = Vec::new();
@@ -151,8 +153,8 @@ impl Clip {
     /// Reads `count` frames from frame `from` on.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`] when they cannot be read, [`ErrorKind::Argument`] when they are outside the clip or hold numbers that are not
-    /// finite, each naming the file.
+    /// [`ErrorKind::Io`] when they cannot be read, [`ErrorKind::Argument`] when they are outside
+    /// the clip or hold numbers that are not finite, each naming the file.
     pub fn read(&self, from: usize, count: usize) -> Result<Segment> {
         if from + count > self.frames {
             let message = format!("frames {from} to {} of a clip of {}", from + count, self.frames);

@@ -13,15 +13,18 @@ use visavis::internals::frame::FRAME_SAMPLES;
 use visavis::stats::GuardStats;
 use visavis::{Engine, FPS, Frame, Result, Root, SessionOptions};
 
-/// Sessions that are averaged: single minutes differ by a third in how far feet slide, so few of them tell nothing.
+/// Sessions that are averaged: single minutes differ by a third in how far feet slide, so few of
+/// them tell nothing.
 const RUNS: usize = 16;
 /// Users who walk away and come back.
 const WALKS: usize = 4;
-/// The gaze target of a long run: free gaze changes its level by chance every few seconds, which would pass for drift.
+/// The gaze target of a long run: free gaze changes its level by chance every few seconds, which
+/// would pass for drift.
 const GAZE: f32 = 0.8;
 
-/// Metrics of the last period of a long run against those of the first: the same voices and the same way of the user come again
-/// in each period and the gaze target is the same throughout, so that only the agent can change.
+/// Metrics of the last period of a long run against those of the first: the same voices and the
+/// same way of the user come again in each period and the gaze target is the same throughout, so
+/// that only the agent can change.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Endurance {
     /// Length of a period, seconds.
@@ -38,7 +41,8 @@ pub struct Endurance {
     pub trips_a_minute: f64,
     /// Part of all frames that it held.
     pub held: f64,
-    /// Whether the guard had to step in so often that the bundle is defective ([`GuardStats::is_defective`]).
+    /// Whether the guard had to step in so often that the bundle is defective
+    /// ([`GuardStats::is_defective`]).
     pub defective: bool,
     /// The agent's mean distance from where it started, in the last period, metres.
     pub wandered: f64,
@@ -164,7 +168,8 @@ impl Run {
     }
 }
 
-/// Both voices of windows one after the other until `frames` frames are full, beginning with another window in each of `runs` runs.
+/// Both voices of windows one after the other until `frames` frames are full, beginning with
+/// another window in each of `runs` runs.
 fn voices(windows: &[Window], [run, runs]: [usize; 2], frames: usize) -> [Vec<f32>; 2] {
     let mut voices = [Vec::new(), Vec::new()];
     let mut order = windows.iter().cycle().skip(run * windows.len() / runs);
@@ -179,7 +184,8 @@ fn voices(windows: &[Window], [run, runs]: [usize; 2], frames: usize) -> [Vec<f3
     voices
 }
 
-/// A user who sways from side to side of the agent, 1.3 to 1.9 m away, and is back after `length` frames.
+/// A user who sways from side to side of the agent, 1.3 to 1.9 m away, and is back after `length`
+/// frames.
 fn circling(i: usize, length: usize) -> Vec3 {
     let u = std::f32::consts::TAU * i as f32 / length as f32;
     let (angle, distance) = (0.9 * u.sin() + 0.3 * (3.0 * u).sin(), 1.6 + 0.3 * (2.0 * u).sin());
@@ -235,7 +241,8 @@ impl Follow {
     }
 }
 
-/// Where the user is after `t` seconds: ahead, 6 m further along an arc, and back along another one that leaves room for the agent.
+/// Where the user is after `t` seconds: ahead, 6 m further along an arc, and back along another one
+/// that leaves room for the agent.
 fn walking(t: f32) -> Vec3 {
     let out = ((t - STAND) / WALK).clamp(0.0, 1.0);
     let home = ((t - STAND - WALK - WAIT) / WALK).clamp(0.0, 1.0);

@@ -1,7 +1,11 @@
 //! What motion measures, window by window, and what a row of the table says.
 
+use super::people::speech;
 use super::window::Window;
-use crate::metrics::{Moments, Space, Split, Summary, acceleration_moments, ape, frechet, pck, pose_moments};
+use crate::metrics::{
+    Liveliness, Moments, NodTally, Nods, Space, Split, Summary, Tally, acceleration_moments, ape, frechet, pck,
+    pose_moments,
+};
 use serde::Serialize;
 use visavis::{Frame, Result, Rig};
 
@@ -19,6 +23,9 @@ pub(super) struct Measured {
     accelerations: Moments,
     ape: Option<f64>,
     pck: Option<f64>,
+    listening: Tally,
+    talking: Tally,
+    nods: NodTally,
 }
 
 impl Measured {
@@ -33,7 +40,17 @@ impl Measured {
         let truth = &window.truth.frames;
         let (ape, pck) = (ape(&frames, truth, Space::Root)?, pck(&frames, truth, CORRECT, Space::Root)?);
         let recording = window.truth.recording(rig, frames);
+        let count = recording.frames.len();
+        let (agent, user) = (speech(window.truth.agent(), count), speech(window.truth.user(), count));
+        let heard: Vec<bool> = agent.iter().zip(&user).map(|(agent, user)| *user && !agent).collect();
+        let (mut listening, mut talking, mut nods) = (Tally::default(), Tally::default(), NodTally::default());
+        listening.add(rig, &recording.frames, &heard);
+        talking.add(rig, &recording.frames, &agent);
+        nods.add(rig, &recording.frames, &agent, &user);
         Ok(Self {
+            listening,
+            talking,
+            nods,
             speaking: window.speaking,
             summary: Summary::of(&recording),
             poses: pose_moments(&recording.frames),
@@ -49,11 +66,11 @@ impl Measured {
 pub struct Figures {
     /// Windows.
     pub windows: usize,
-    /// Frechet distance of poses to the corpus', m²: over all windows the mean over batches of 8 windows, over a class of windows that
-    /// of the pooled class (SARAH 4).
+    /// Frechet distance of poses to the corpus', m²: over all windows the mean over batches of 8
+    /// windows, over a class of windows that of the pooled class (SARAH 4).
     pub fgd: Option<f64>,
-    /// Over all windows: the distance of each batch, whose mean is [`Figures::fgd`]. What two bundles' batches differ by tells how sure
-    /// the difference of their means is.
+    /// Over all windows: the distance of each batch, whose mean is [`Figures::fgd`]. What two
+    /// bundles' batches differ by tells how sure the difference of their means is.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub fgd_batches: Vec<f64>,
     /// Frechet distance of accelerations, (m/s²)², likewise.
@@ -95,8 +112,15 @@ pub struct Row {
     pub speaking: Figures,
     /// Over the others.
     pub non_speaking: Figures,
-    /// Wrist speed in frames in which the agent speaks over that in the others, in windows that have both.
+    /// Wrist speed in frames in which the agent speaks over that in the others, in windows that
+    /// have both.
     pub wrist_ratio: Option<f64>,
+    /// How lively the agent is while the user speaks alone.
+    pub listens: Liveliness,
+    /// How lively it is while it speaks.
+    pub talks: Liveliness,
+    /// Its nods as a listener.
+    pub nods: Nods,
 }
 
 impl Row {
@@ -109,6 +133,9 @@ impl Row {
             speaking: figures(Some(true)),
             non_speaking: figures(Some(false)),
             wrist_ratio: wrist_ratio(motion),
+            listens: tally(motion, |m| &m.listening).row(),
+            talks: tally(motion, |m| &m.talking).row(),
+            nods: nods(motion).row(),
         }
     }
 }
@@ -151,6 +178,20 @@ fn pooled(windows: &[&Measured], moments: &dyn Fn(&Measured) -> &Moments) -> Mom
     let dim = windows.first().map_or(0, |m| moments(m).dim());
     windows.iter().fold(Moments::new(dim), |mut all, m| {
         all.merge(moments(m));
+        all
+    })
+}
+
+fn tally(motion: &[Measured], part: impl Fn(&Measured) -> &Tally) -> Tally {
+    motion.iter().fold(Tally::default(), |mut all, m| {
+        all.merge(part(m).clone());
+        all
+    })
+}
+
+fn nods(motion: &[Measured]) -> NodTally {
+    motion.iter().fold(NodTally::default(), |mut all, m| {
+        all.merge(m.nods.clone());
         all
     })
 }

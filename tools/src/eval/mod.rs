@@ -5,9 +5,10 @@
 //!                  -> reconstruction, reaction time, endurance, following        -> verdicts on the targets
 //! ```
 //!
-//! A [`Window`] is 13.3 s of a clip. The model is given its voices and the way of its user, starting where the clip's agent stands two
-//! seconds earlier; then all motions are measured over the same frames by the same code ([`crate::metrics`]), the corpus' own included.
-//! Everything is deterministic: same bundle, clips and options, same figures, on any number of threads.
+//! A [`Window`] is 13.3 s of a clip. The model is given its voices and the way of its user,
+//! starting where the clip's agent stands two seconds earlier; then all motions are measured over
+//! the same frames by the same code ([`crate::metrics`]), the corpus' own included. Everything is
+//! deterministic: same bundle, clips and options, same figures, on any number of threads.
 //!
 //! ```no_run
 //! # fn main() -> visavis::Result<()> {
@@ -27,12 +28,13 @@ mod calibrate;
 mod clip;
 mod endurance;
 mod figures;
-mod made_up;
 mod motion;
 mod parallel;
+mod people;
 mod reaction;
 mod reconstruction;
 mod report;
+mod synthetic;
 mod targets;
 mod window;
 
@@ -41,9 +43,10 @@ pub use calibrate::calibrate;
 pub use clip::{Clip, Segment};
 pub use endurance::{Change, Endurance, Follow};
 pub use figures::{CORRECT, Figures, Row};
-pub use made_up::made_up;
+pub use people::Idle;
 pub use reaction::{FOUND, PATIENCE, Reaction};
 pub use reconstruction::Reconstruction;
+pub use synthetic::synthetic;
 pub use targets::Verdict;
 pub use window::{LEAD, WINDOW, Window};
 
@@ -63,16 +66,19 @@ pub struct EvalOptions {
     pub windows: usize,
     /// Threads that work on different windows.
     pub threads: usize,
-    /// Samplers to compare; the first is the reference. Those that need a student are left out of a bundle without one.
+    /// Samplers to compare; the first is the reference. Those that need a student are left out of a
+    /// bundle without one.
     pub samplers: Vec<Sampler>,
     /// Options of every session; seed, start, sampler and gaze are set by the evaluation.
     pub session: SessionOptions,
-    /// Fewer and shorter runs, for a look: the gaze dial, reaction, endurance and following are tried a few times only.
+    /// Fewer and shorter runs, for a look: the gaze dial, reaction, endurance and following are
+    /// tried a few times only.
     pub quick: bool,
-    /// Only what two bundles are compared by: the corpus' row, the samplers' with free gaze, reconstruction. No looked-up motion, gaze
-    /// dials, reaction, endurance and following.
+    /// Only what two bundles are compared by: the corpus' row, the samplers' with free gaze,
+    /// reconstruction. No looked-up motion, gaze dials, reaction, endurance and following.
     pub motion_only: bool,
-    /// Window `i` has the seed `2^32 seed + i`: with another seed here the figures tell what chance alone changes.
+    /// Window `i` has the seed `2^32 seed + i`: with another seed here the figures tell what chance
+    /// alone changes.
     pub seed: u32,
 }
 
@@ -117,8 +123,14 @@ pub struct Report {
     pub quick: bool,
     /// What Random and NN looked up their motion in.
     pub bank: String,
-    /// `corpus`, `Random`, `NN` (these two where they were asked for), then the samplers with free gaze, then the gaze targets.
+    /// `corpus`, `Random`, `NN` (these two where they were asked for), then the samplers with free
+    /// gaze, then the gaze targets.
     pub rows: Vec<Row>,
+    /// Nobody speaks and the user stands: `real people`, `corpus` where it has such stretches, then
+    /// the samplers.
+    pub idle: Vec<Idle>,
+    /// How lively real people are who talk.
+    pub real_talk: crate::metrics::Liveliness,
     /// The gaze dial of the first sampler and of the single step.
     pub dials: Vec<Dial>,
     /// What the autoencoder loses.
@@ -144,11 +156,12 @@ pub struct EvalProgress<'a> {
     pub total: usize,
 }
 
-/// Evaluates a bundle on `clips`; `bank` are other clips, best those of training, in which Random and NN look up their motion.
+/// Evaluates a bundle on `clips`; `bank` are other clips, best those of training, in which Random
+/// and NN look up their motion.
 ///
 /// # Errors
-/// Those of [`Clip::read`], [`Window::choose`] and of sessions made with the options; [`ErrorKind::Argument`] for options that
-/// make no sense.
+/// Those of [`Clip::read`], [`Window::choose`] and of sessions made with the options;
+/// [`ErrorKind::Argument`] for options that make no sense.
 pub fn evaluate(
     engine: &Arc<Engine>,
     clips: &[Clip],
@@ -191,6 +204,16 @@ pub fn evaluate(
         rows.extend(dialled);
     }
 
+    tell("at rest");
+    let real = people::Real::read()?;
+    let mut idle = vec![Idle { name: "real people".into(), figures: real.idle }];
+    idle.extend(Idle::of_clips(&engine.config().rig, clips)?);
+    for &sampler in &samplers {
+        let seed = u64::from(options.seed) << 32;
+        let session = SessionOptions { sampler, gaze: None, seed, ..options.session.clone() };
+        idle.push(Idle::of_sessions(engine, &session, options.threads, options.quick)?);
+    }
+
     let session = SessionOptions { sampler: samplers[0], gaze: None, ..options.session.clone() };
     let (threads, quick) = (options.threads, options.quick);
     tell("reconstruction");
@@ -211,6 +234,8 @@ pub fn evaluate(
         quick,
         bank: searched,
         rows,
+        idle,
+        real_talk: real.speaking,
         dials,
         reconstruction,
         reaction,

@@ -8,7 +8,7 @@ use glam::Vec3;
 use std::sync::Arc;
 use visavis::{Engine, FPS, Frame, Result, SessionOptions};
 
-/// Runs a session over voices (full scale 1) and a user's head (one position a frame).
+/// Runs a session over voices (full scale 1) and a user's head (one position per frame).
 pub(super) fn generate(
     engine: &Arc<Engine>,
     options: SessionOptions,
@@ -23,7 +23,8 @@ pub(super) fn generate(
     run(&mut engine.session(options)?, &talk, &mut |_| {})
 }
 
-/// The model's motion in a window: a session that starts where the clip's agent stands, without what leads in.
+/// The model's motion in a window: a session that starts where the clip's agent stands, without
+/// what leads in.
 pub(super) fn in_window(engine: &Arc<Engine>, options: &SessionOptions, window: &Window) -> Result<Vec<Frame>> {
     let Segment { frames, user, .. } = &window.segment;
     let options = SessionOptions { start: frames[0].root, ..options.clone() };

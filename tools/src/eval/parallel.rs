@@ -4,8 +4,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use visavis::Result;
 
-/// `work(i)` for `i` below `count`, in order, done by `threads` threads; the result does not depend on how many. `done` is told
-/// how many are done, from any thread. The first error by order is returned.
+/// `work(i)` for `i` below `count`, in order, done by `threads` threads; the result does not depend
+/// on how many. `done` is told how many are done, from any thread. The first error by order is
+/// returned.
 pub(super) fn each<T: Send>(
     threads: usize,
     count: usize,

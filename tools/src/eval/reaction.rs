@@ -45,8 +45,8 @@ struct Event {
 }
 
 impl Reaction {
-    /// Measures the corpus' agent and the model over jumps in `clips`, and the model over staged ones with the voices of `windows`;
-    /// `quick`: four of each at most.
+    /// Measures the corpus' agent and the model over jumps in `clips`, and the model over staged
+    /// ones with the voices of `windows`; `quick`: four of each at most.
     pub(super) fn measure(
         engine: &Arc<Engine>,
         options: &SessionOptions,
@@ -146,7 +146,8 @@ mod tests {
         let head = rig.index("head").unwrap();
         let user = vec![Vec3::new(50.0, 1.6, 0.0); 90];
         for (i, frame) in frames.iter_mut().enumerate() {
-            // From ahead to the right by 3 degrees a frame: within 20 of a right angle after 70 degrees.
+            // From ahead to the right by 3 degrees a frame: within 20 of a right angle after 70
+            // degrees.
             let turn = (3.0 * i as f32).min(90.0).to_radians();
             frame.global[head].position = Vec3::new(0.0, 1.5, 0.0);
             frame.global[head].rotation = glam::Quat::from_rotation_y(turn);

@@ -2,6 +2,7 @@
 
 use super::figures::{Figures, Row};
 use super::{GAZE_TARGETS, Report};
+use crate::metrics::{Liveliness, Nods};
 use std::fmt::Write;
 
 /// A table: a head and rows of cells.
@@ -13,7 +14,8 @@ struct Table {
 impl Report {
     /// Pretty-printed JSON with a final newline.
     pub fn to_json(&self) -> String {
-        // Only maps with keys that are no strings and failing writers make this fail; there is neither.
+        // Only maps with keys that are no strings and failing writers make this fail; there is
+        // neither.
         serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
     }
 
@@ -42,6 +44,14 @@ impl Report {
         };
         part("Motion (speaking / non-speaking in brackets; FGD cm², FGD_acc (m/s²)², wrists m/s)", &self.motion());
         part("Feet, voice, keypoints (support foot mm/s, APE mm, PCK at 10 cm, bones %)", &self.details());
+        part(
+            "At rest, the user stands and nobody speaks (both hands below 3 cm/s; hands and head relative to the hips, m/s, m/s²; a minute; cm in 30 s; power of hand speed by octave from 0.2 to 8 Hz, mm/s)",
+            &self.at_rest(),
+        );
+        part(
+            "Listening and speaking (likewise; nods a minute while the user speaks / in the pauses / when nobody does)",
+            &self.talk(),
+        );
         if !self.dials.is_empty() {
             part("Gaze dial: mean score reached", &self.gaze());
         }
@@ -92,6 +102,42 @@ impl Report {
             &["row", "support foot", "beat", "beat, shuffled voice", "APE", "PCK", "bones", "joints m/s"],
             self.rows.iter().filter(|row| row.gaze_target.is_none()).map(row),
         )
+    }
+
+    fn at_rest(&self) -> Table {
+        let row = |idle: &super::Idle| {
+            let f = &idle.figures;
+            let spectrum: Vec<_> = f.hand_spectrum.iter().map(|v| format!("{:.0}", 1000.0 * v)).collect();
+            let mut cells = vec![idle.name.clone()];
+            cells.extend(lively(f));
+            cells.extend([number(f.sway, 1), number(f.still_stretches, 1), spectrum.join(" ")]);
+            cells
+        };
+        let mut head = LIVELY.to_vec();
+        head.extend(["sway", "still stretches", "spectrum"]);
+        Table::new(&head, self.idle.iter().map(row))
+    }
+
+    fn talk(&self) -> Table {
+        let nod = |n: &Nods| {
+            let rates = [n.speaks, n.pauses, n.nobody].map(|v| number(v, 1));
+            [rates.join(" / "), number(n.lag, 2)]
+        };
+        let row = |name: String, f: &Liveliness, nods: [String; 2]| {
+            let mut cells = vec![name];
+            cells.extend(lively(f));
+            cells.extend(nods);
+            cells
+        };
+        let none = || [String::from("-"), String::from("-")];
+        let mut rows = vec![row("real people, speaking".into(), &self.real_talk, none())];
+        for own in self.rows.iter().filter(|row| row.gaze_target.is_none()) {
+            rows.push(row(format!("{}, listening", own.name), &own.listens, nod(&own.nods)));
+            rows.push(row(format!("{}, speaking", own.name), &own.talks, none()));
+        }
+        let mut head = LIVELY.to_vec();
+        head.extend(["nods", "lag s"]);
+        Table::new(&head, rows)
     }
 
     fn gaze(&self) -> Table {
@@ -180,6 +226,21 @@ impl Table {
         let rule = format!("|{}\n", "---|".repeat(self.head.len()));
         std::iter::once(line(&self.head)).chain([rule]).chain(self.rows.iter().map(line)).collect()
     }
+}
+
+/// Columns of [`lively`], after the row's name.
+const LIVELY: [&str; 7] =
+    ["row", "stillness", "hand speed", "hand acceleration", "head speed", "head acceleration", "rest changes"];
+
+fn lively(f: &Liveliness) -> [String; 6] {
+    [
+        number(f.stillness, 2),
+        number(f.hand_speed, 3),
+        number(f.hand_acceleration, 2),
+        number(f.head_speed, 3),
+        number(f.head_acceleration, 3),
+        number(f.rest_changes, 1),
+    ]
 }
 
 fn number(value: Option<f64>, digits: usize) -> String {

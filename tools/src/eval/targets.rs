@@ -21,11 +21,12 @@ pub struct Verdict {
     pub met: Option<bool>,
 }
 
-/// How near a gaze score must come to its target, and how many windows of the corpus have such a score before that is asked.
+/// How near a gaze score must come to its target, and how many windows of the corpus have such a
+/// score before that is asked.
 const GAZE_TOLERANCE: f64 = 0.1;
 const GAZE_WINDOWS: usize = 3;
-/// A user is followed when the agent stands within this distance after a wait, metres: nearer than people who do not talk with each
-/// other stand (Hall 1966).
+/// A user is followed when the agent stands within this distance after a wait, metres: nearer than
+/// people who do not talk with each other stand (Hall 1966).
 const FOLLOWED: f64 = 2.5;
 
 /// Every target against the report.
@@ -35,6 +36,7 @@ pub(super) fn verdicts(report: &Report) -> Vec<Verdict> {
     if let (Some(truth), Some(first)) = (report.row("corpus"), report.models().next()) {
         all.extend(motion(report, truth, first));
     }
+    all.extend(at_rest(report));
     for dial in &report.dials {
         all.extend(self::dial(dial));
     }
@@ -102,6 +104,28 @@ fn motion(report: &Report, truth: &Row, row: &Row) -> Vec<Verdict> {
             part(single.all.fgd, m.fgd),
             1.25,
         ));
+    }
+    all
+}
+
+/// The samplers that sessions use, at rest, against real people.
+fn at_rest(report: &Report) -> Vec<Verdict> {
+    let row = |name: &str| report.idle.iter().find(|idle| idle.name == name);
+    let (Some(real), Some(first)) = (row("real people"), report.models().next()) else { return Vec::new() };
+    let single = report.row("single").filter(|single| single.name != first.name);
+    let mut all = Vec::new();
+    for own in std::iter::once(first).chain(single).filter_map(|model| row(&model.name)) {
+        let (r, m) = (&real.figures, &own.figures);
+        for (what, real, value) in [
+            ("stillness", r.stillness, m.stillness),
+            ("hand speed", r.hand_speed, m.hand_speed),
+            ("rest changes", r.rest_changes, m.rest_changes),
+            ("head speed", r.head_speed, m.head_speed),
+        ] {
+            let part = value.zip(real).map(|(value, real)| value / real);
+            let what = format!("at rest, {what}, {}", own.name);
+            all.push(between(&what, "0.75 to 1.25 of real people's", part, 0.75, 1.25));
+        }
     }
     all
 }

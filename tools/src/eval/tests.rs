@@ -32,7 +32,7 @@ fn quick(threads: usize) -> Report {
     let engine = tiny();
     let samplers = vec![Sampler::Midpoint1, Sampler::Single];
     let options = EvalOptions { windows: 4, threads, samplers, quick: true, ..EvalOptions::default() };
-    evaluate(&engine, &made_up(&engine.config().rig, &talk()), None, &options, &|_| {}).unwrap()
+    evaluate(&engine, &synthetic(&engine.config().rig, &talk()), None, &options, &|_| {}).unwrap()
 }
 
 #[test]
@@ -50,7 +50,8 @@ fn a_report_is_whole_and_the_same_on_any_number_of_threads() {
     assert!(truth.head_angle.unwrap() > 0.9, "the procedural person looks at the user: {truth:?}");
     assert!(truth.beat.unwrap() > truth.beat_shuffled.unwrap(), "and lifts its hands when it speaks: {truth:?}");
     assert!(report.rows[0].wrist_ratio.unwrap() > 1.0);
-    // Random weights make no conversation: far from the corpus in pose and gaze, and the report says so.
+    // Random weights make no conversation: far from the corpus in pose and gaze, and the report
+    // says so.
     let model = &report.rows[3].all;
     assert!(model.fgd.unwrap() > 10.0 * report.rows[2].all.fgd.unwrap(), "{model:?}");
     let missed = |what: &str| report.verdicts.iter().find(|v| v.what.starts_with(what)).unwrap().met == Some(false);
@@ -69,7 +70,7 @@ fn a_report_is_whole_and_the_same_on_any_number_of_threads() {
 #[test]
 fn motion_alone_has_the_same_figures() {
     let engine = tiny();
-    let clips = made_up(&engine.config().rig, &talk());
+    let clips = synthetic(&engine.config().rig, &talk());
     let samplers = vec![Sampler::Midpoint1, Sampler::Single];
     let whole = EvalOptions { windows: 4, samplers, quick: true, ..EvalOptions::default() };
     let run = |seed| {
@@ -90,7 +91,8 @@ fn motion_alone_has_the_same_figures() {
     assert!(other.rows[0] == report.rows[0] && other.rows[1] != report.rows[1]);
 }
 
-/// A bundle whose poses no body could take is called defective, whether the guard trips again and again or holds without end.
+/// A bundle whose poses no body could take is called defective, whether the guard trips again and
+/// again or holds without end.
 #[test]
 fn a_bundle_that_trips_the_guard_is_defective() {
     let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/goldens/tiny.safetensors")).unwrap();
@@ -105,7 +107,7 @@ fn a_bundle_that_trips_the_guard_is_defective() {
         let engine = Engine::from_bytes(bytes, "tiny").unwrap();
         let options =
             EvalOptions { windows: 2, samplers: vec![Sampler::Single], quick: true, ..EvalOptions::default() };
-        let report = evaluate(&engine, &made_up(&engine.config().rig, &talk()), None, &options, &|_| {}).unwrap();
+        let report = evaluate(&engine, &synthetic(&engine.config().rig, &talk()), None, &options, &|_| {}).unwrap();
         let verdict = report.verdicts.iter().find(|v| v.what == "endurance: plausibility guard").unwrap().clone();
         assert_eq!(report.to_text().contains("this bundle is defective"), verdict.met == Some(false));
         (report.endurance.unwrap(), verdict)
@@ -121,7 +123,7 @@ fn a_bundle_that_trips_the_guard_is_defective() {
 fn spoilt_motion_is_told_from_the_corpus() {
     let engine = tiny();
     let rig = &engine.config().rig;
-    let clips = made_up(rig, &talk());
+    let clips = synthetic(rig, &talk());
     let windows = Window::choose(&clips, 2).unwrap();
     let measure = |spoil: &dyn Fn(usize, &mut Frame)| {
         let of = |window: &Window| {
@@ -149,7 +151,7 @@ fn spoilt_motion_is_told_from_the_corpus() {
 #[test]
 fn windows_without_voices_have_all_their_frames() {
     let engine = tiny();
-    let clips = made_up(&engine.config().rig, &talk());
+    let clips = synthetic(&engine.config().rig, &talk());
     let mut window = Window::choose(&clips, 1).unwrap().remove(0);
     (window.segment.agent_voice, window.segment.user_voice) = (None, None);
     let options = SessionOptions { sampler: Sampler::Single, ..Default::default() };
@@ -159,7 +161,7 @@ fn windows_without_voices_have_all_their_frames() {
 #[test]
 fn windows_do_not_overlap_and_spread() {
     let engine = tiny();
-    let clips = made_up(&engine.config().rig, &talk());
+    let clips = synthetic(&engine.config().rig, &talk());
     let windows = Window::choose(&clips, 3).unwrap();
     assert_eq!(windows.iter().map(|w| w.clip).collect::<Vec<_>>(), [0, 1, 1]);
     assert!(windows.iter().all(|w| w.segment.frames.len() == LEAD + WINDOW && w.truth.frames.len() == WINDOW));
@@ -170,7 +172,7 @@ fn windows_do_not_overlap_and_spread() {
 #[test]
 fn nearest_neighbours_are_near() {
     let engine = tiny();
-    let clips = made_up(&engine.config().rig, &talk());
+    let clips = synthetic(&engine.config().rig, &talk());
     let windows = Window::choose(&clips, 4).unwrap();
     let bank = Bank::new(clips.clone(), false).unwrap();
     // With its own clip in the bank, a window finds itself, give or take the step of the stretches.
@@ -189,7 +191,7 @@ fn nearest_neighbours_are_near() {
 #[test]
 fn calibration_measures_the_channel() {
     let engine = tiny();
-    let clips = made_up(&engine.config().rig, &talk());
+    let clips = synthetic(&engine.config().rig, &talk());
     // Random weights need not follow their channel; then that is said.
     let outcome = |threads| calibrate(&engine, &clips, 2, threads, &|_| {});
     match (outcome(1), outcome(2)) {

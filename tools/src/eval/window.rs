@@ -6,7 +6,8 @@ use visavis::{Error, ErrorKind, Result};
 
 /// Frames that are measured, as many as SARAH's test sequences have (13.3 s).
 pub const WINDOW: usize = 400;
-/// Frames before them that are generated and not measured: a session starts from its idle clip, not from the clip's pose (2 s).
+/// Frames before them that are generated and not measured: a session starts from its idle clip, not
+/// from the clip's pose (2 s).
 pub const LEAD: usize = 60;
 
 /// A stretch of a clip: [`LEAD`] frames that lead in, then [`WINDOW`] frames.
@@ -23,7 +24,8 @@ pub struct Window {
 }
 
 impl Window {
-    /// At most `count` windows of `clips`, without overlap and evenly spread over all that there are.
+    /// At most `count` windows of `clips`, without overlap and evenly spread over all that there
+    /// are.
     ///
     /// # Errors
     /// Those of [`Clip::read`]; [`ErrorKind::Argument`] when no clip is long enough.

@@ -21,13 +21,13 @@ impl Drop for Temporary {
     }
 }
 
-/// Writes a file through `write` so that `path` is either the whole new file or what it was before: the bytes go to a
-/// hidden temporary file beside the target, are flushed to the disk, and the file is renamed. The temporary file is removed
-/// when anything fails, also when `write` panics.
+/// Writes a file through `write` so that `path` is either the whole new file or what it was before:
+/// the bytes go to a hidden temporary file beside the target, are flushed to the disk, and the file
+/// is renamed. The temporary file is removed when anything fails, also when `write` panics.
 ///
 /// # Errors
-/// [`ErrorKind::Io`] naming `path`: the folder is missing or not writable, `path` is a folder, the disk is full, or `write`
-/// itself failed. [`ErrorKind::Argument`] if `path` has no file name.
+/// [`ErrorKind::Io`] naming `path`: the folder is missing or not writable, `path` is a folder, the
+/// disk is full, or `write` itself failed. [`ErrorKind::Argument`] if `path` has no file name.
 pub fn write_atomically<F>(path: impl AsRef<Path>, write: F) -> Result<()>
 where
     F: FnOnce(&mut dyn Write) -> io::Result<()>,

@@ -1,9 +1,10 @@
 //! Biovision hierarchy.
 //!
-//! Units are centimetres (metres x 100), the convention of the tools that read BVH; Y up, facing +Z. Joints are named as in
-//! the rig. The root has an offset of zero and its world position in the motion lines; every joint has the channels
-//! `Zrotation Xrotation Yrotation`, degrees, meaning `R = Rz Rx Ry`. Angles are continuous over time, so they may exceed
-//! 180 degrees. One line a frame, frame time 1/30 s.
+//! Units are centimetres (metres x 100), the convention of the tools that read BVH; Y up, facing
+//! +Z. Joints are named as in the rig. The root has an offset of zero and its world position in the
+//! motion lines; every joint has the channels `Zrotation Xrotation Yrotation`, degrees, meaning `R
+//! = Rz Rx Ry`. Angles are continuous over time, so they may exceed 180 degrees. One line per
+//! frame, frame time 1/30 s.
 
 mod euler;
 
@@ -18,14 +19,15 @@ use visavis::{FPS, Result, Rig};
 /// Units of the file in a metre.
 const SCALE: f64 = 100.0;
 
-/// Writes the motion of the rig as BVH: centimetres, channels `Zrotation Xrotation Yrotation` (`R = Rz Rx Ry`), 30 fps.
+/// Writes the motion of the rig as BVH: centimetres, channels `Zrotation Xrotation Yrotation` (`R =
+/// Rz Rx Ry`), 30 fps.
 ///
 /// Joint positions are those of [`visavis::Frame::hips`] and [`visavis::Frame::local`] to 0.01 mm.
 ///
 /// # Errors
-/// [`visavis::ErrorKind::Argument`] if the recording has no frames, or frames that do not fit its rig or are not finite;
-/// [`visavis::ErrorKind::BundleInvalid`] if the rig does not pass [`Rig::check`]; [`visavis::ErrorKind::Io`] if the file cannot be
-/// written. All name `path`.
+/// [`visavis::ErrorKind::Argument`] if the recording has no frames, or frames that do not fit its
+/// rig or are not finite; [`visavis::ErrorKind::BundleInvalid`] if the rig does not pass
+/// [`Rig::check`]; [`visavis::ErrorKind::Io`] if the file cannot be written. All name `path`.
 pub fn write_bvh(recording: &Recording, path: impl AsRef<Path>) -> Result<()> {
     let path = path.as_ref();
     check(recording, path)?;
@@ -63,7 +65,8 @@ fn depth_first(rig: &Rig) -> Vec<usize> {
     order
 }
 
-/// The block of joint `j` and, inside it, those below. Recursion is as deep as the rig, at most 256.
+/// The block of joint `j` and, inside it, those below. Recursion is as deep as the rig, at most
+/// 256.
 fn hierarchy(rig: &Rig, j: usize, depth: usize, w: &mut dyn Write) -> io::Result<()> {
     let tab = "\t".repeat(depth);
     let name = &rig.joints[j].name;

@@ -19,10 +19,11 @@ use visavis::Result;
 /// Radius of the ball that stands for the user's head, metres.
 const USER_HEAD: f32 = 0.11;
 
-/// Writes the motion of the rig as a `.glb`: a node a joint (named as in the rig, metres, Y up, facing +Z at rest), a body of
-/// rounded cones skinned rigidly to them, one animation at 30 fps from time 0 (translation of the hips, rotation of every
-/// joint), and a node `userHead` with a ball where the user's head was. While the user's position is unknown, the ball is
-/// scaled to nothing; a recording without any position has no such node.
+/// Writes the motion of the rig as a `.glb`: a node a joint (named as in the rig, metres, Y up,
+/// facing +Z at rest), a body of rounded cones skinned rigidly to them, one animation at 30 fps
+/// from time 0 (translation of the hips, rotation of every joint), and a node `userHead` with a
+/// ball where the user's head was. While the user's position is unknown, the ball is scaled to
+/// nothing; a recording without any position has no such node.
 ///
 /// # Errors
 /// As [`super::write_bvh`].

@@ -7,7 +7,8 @@
 //! | `.vrma` ([`write_vrma`]) | VRM avatars | the skeleton mapped to the VRM humanoid, animated |
 //!
 //! All of them hold the motion of the fixed-bone-length rig ([`visavis::Frame::hips`] and
-//! [`visavis::Frame::local`]), at 30 fps from time 0. A file appears whole or not at all ([`write_atomically`]).
+//! [`visavis::Frame::local`]), at 30 fps from time 0. A file appears whole or not at all
+//! ([`write_atomically`]).
 
 mod atomic;
 mod bvh;
@@ -27,8 +28,8 @@ use glam::Vec3;
 use std::path::{Path, PathBuf};
 use visavis::{Error, ErrorKind, Result, Rig};
 
-/// Writes `motion.bvh`, `motion.glb` and `motion.vrma` into the folder `dir`, which is made if it is missing, and returns
-/// their paths in this order.
+/// Writes `motion.bvh`, `motion.glb` and `motion.vrma` into the folder `dir`, which is made if it
+/// is missing, and returns their paths in this order.
 ///
 /// # Errors
 /// [`ErrorKind::Io`] if the folder cannot be made; those of the writers.
@@ -69,7 +70,8 @@ fn check(recording: &Recording, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Where the body ends beyond a joint without children, in the joint's frame, metres: crown, finger tips, toe tips.
+/// Where the body ends beyond a joint without children, in the joint's frame, metres: crown, finger
+/// tips, toe tips.
 fn tip(rig: &Rig, j: usize) -> Vec3 {
     let along = rig.offset(j).normalize_or(Vec3::Y);
     match rig.joints[j].name.as_str() {

@@ -1,8 +1,9 @@
 //! VRM animation: glTF binary with the extension `VRMC_vrm_animation` 1.0.
 //!
-//! The file has the skeleton's nodes at rest (T-pose, facing +Z, no rotations), the map from VRM humanoid bones to nodes and
-//! the animation: translation of the hips and rotation of every mapped joint. Where the gaze goes is in the head's rotation;
-//! the file has no `lookAt`, since the motion has no eyes of its own.
+//! The file has the skeleton's nodes at rest (T-pose, facing +Z, no rotations), the map from VRM
+//! humanoid bones to nodes and the animation: translation of the hips and rotation of every mapped
+//! joint. Where the gaze goes is in the head's rotation; the file has no `lookAt`, since the motion
+//! has no eyes of its own.
 
 mod humanoid;
 
@@ -18,13 +19,15 @@ use visavis::{Error, ErrorKind, Result, Rig};
 /// Name of the extension, version 1.0.
 const EXTENSION: &str = "VRMC_vrm_animation";
 
-/// Writes the motion of the rig as a `.vrma` (VRM animation 1.0) for VRM avatars: metres, 30 fps from time 0.
+/// Writes the motion of the rig as a `.vrma` (VRM animation 1.0) for VRM avatars: metres, 30 fps
+/// from time 0.
 ///
 /// Joints whose names are not VRM humanoid bones are in the file but not mapped.
 ///
 /// # Errors
-/// As [`super::write_bvh`]; also [`ErrorKind::Argument`] if the rig lacks a bone that the VRM humanoid requires (hips, spine,
-/// head, upper and lower arms, hands, upper and lower legs, feet) or its hierarchy is not that of the humanoid.
+/// As [`super::write_bvh`]; also [`ErrorKind::Argument`] if the rig lacks a bone that the VRM
+/// humanoid requires (hips, spine, head, upper and lower arms, hands, upper and lower legs, feet)
+/// or its hierarchy is not that of the humanoid.
 pub fn write_vrma(recording: &Recording, path: impl AsRef<Path>) -> Result<()> {
     let path = path.as_ref();
     check(recording, path)?;

@@ -9,7 +9,8 @@ use serde::Serialize;
 const MAX_LAG: f64 = 0.3;
 /// Shuffles that the reference value is averaged over.
 const SHUFFLES: u64 = 32;
-/// Shuffling moves pieces of this length, frames: short enough to lose the sentence, long enough to keep syllables whole.
+/// Shuffling moves pieces of this length, frames: short enough to lose the sentence, long enough to
+/// keep syllables whole.
 const PIECE: usize = 30;
 
 /// How wrist speed follows the agent's voice.
@@ -17,15 +18,19 @@ const PIECE: usize = 30;
 pub struct Beat {
     /// Pearson correlation of speech envelope and wrist speed at the best lag, -1 to 1.
     pub correlation: f64,
-    /// Lag of the wrists behind the voice at that correlation, seconds; negative when the hands lead.
+    /// Lag of the wrists behind the voice at that correlation, seconds; negative when the hands
+    /// lead.
     pub lag: f64,
-    /// The same with the voice cut into pieces of a second and shuffled (mean of 32 fixed shuffles): what chance gives.
+    /// The same with the voice cut into pieces of a second and shuffled (mean of 32 fixed
+    /// shuffles): what chance gives.
     pub shuffled: f64,
 }
 
-/// Correlation between the agent's speech envelope (RMS a frame) and wrist speed, best lag within ±0.3 s.
+/// Correlation between the agent's speech envelope (RMS a frame) and wrist speed, best lag within
+/// ±0.3 s.
 ///
-/// `None` without an agent voice, without hands, below two seconds, or when voice or wrists never change.
+/// `None` without an agent voice, without hands, below two seconds, or when voice or wrists never
+/// change.
 pub fn beat(recording: &Recording) -> Option<Beat> {
     let wrists = wrist_speeds(&recording.rig, &recording.frames)?;
     if wrists.len() < 2 * PIECE {

@@ -36,10 +36,11 @@ fn horizontal_speed(from: Vec3, to: Vec3) -> f64 {
     f64::from((to.x - from.x).hypot(to.z - from.z)) * RATE
 }
 
-/// Clearance of each foot in each frame, metres: `[left, right]`; a foot the rig lacks is infinitely high.
+/// Clearance of each foot in each frame, metres: `[left, right]`; a foot the rig lacks is
+/// infinitely high.
 ///
-/// Ankle and toe joints lie inside the foot, so their height above the floor is taken relative to the rest pose, which
-/// stands on the floor; the lower of the two counts, be it heel or toes.
+/// Ankle and toe joints lie inside the foot, so their height above the floor is taken relative to
+/// the rest pose, which stands on the floor; the lower of the two counts, be it heel or toes.
 pub fn foot_clearances(rig: &Rig, frames: &[Frame]) -> Vec<[f64; 2]> {
     let points = |names: [&str; 2]| Foot::all(rig).into_iter().find(|foot| Some(foot.0[0].0) == joint(rig, names[0]));
     let feet = [points(["leftFoot", "leftToes"]), points(["rightFoot", "rightToes"])];
@@ -47,7 +48,8 @@ pub fn foot_clearances(rig: &Rig, frames: &[Frame]) -> Vec<[f64; 2]> {
     frames.iter().map(|frame| [clearance(&feet[0], frame), clearance(&feet[1], frame)]).collect()
 }
 
-/// Share of frames (0 to 1) with a foot below [`CONTACT_HEIGHT`] moving horizontally faster than [`SLIDE_SPEED`].
+/// Share of frames (0 to 1) with a foot below [`CONTACT_HEIGHT`] moving horizontally faster than
+/// [`SLIDE_SPEED`].
 ///
 /// The first frame has no speed and does not count.
 pub fn foot_slide(rig: &Rig, frames: &[Frame]) -> Option<f64> {

@@ -3,12 +3,13 @@
 use super::Moments;
 use super::linalg::{eigen, multiply, sqrt};
 
-/// Frechet distance (squared 2-Wasserstein distance of the fitted Gaussians; Dowson and Landau 1982, as used by FGD):
-/// `|m1 - m2|² + tr(S1 + S2 - 2 (S1^½ S2 S1^½)^½)`.
+/// Frechet distance (squared 2-Wasserstein distance of the fitted Gaussians; Dowson and Landau
+/// 1982, as used by FGD): `|m1 - m2|² + tr(S1 + S2 - 2 (S1^½ S2 S1^½)^½)`.
 ///
 /// In the square of the samples' unit: m² for [`pose_moments`](super::pose_moments), (m/s²)² for
-/// [`acceleration_moments`](super::acceleration_moments). For speaking and non-speaking clips, merge the moments of all clips of a
-/// class on each side first (pooled, as SARAH 4). `None` when dimensions differ or a side has less than two samples.
+/// [`acceleration_moments`](super::acceleration_moments). For speaking and non-speaking clips,
+/// merge the moments of all clips of a class on each side first (pooled, as SARAH 4). `None` when
+/// dimensions differ or a side has less than two samples.
 pub fn frechet(a: &Moments, b: &Moments) -> Option<f64> {
     let n = a.dim();
     if n == 0 || n != b.dim() {
@@ -39,7 +40,8 @@ mod tests {
     use super::super::testing::{close, recording};
     use super::*;
 
-    /// Samples with exactly this mean and covariance `diag(variance)`, turned by `angle` about the mean.
+    /// Samples with exactly this mean and covariance `diag(variance)`, turned by `angle` about the
+    /// mean.
     fn gaussian(mean: [f64; 2], variance: [f64; 2], angle: f64) -> Moments {
         let mut moments = Moments::new(2);
         let (s, c) = angle.sin_cos();

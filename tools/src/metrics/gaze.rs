@@ -7,8 +7,9 @@ use visavis::{Frame, Rig};
 
 /// Gaze score of a frame, -1 to 1 (SARAH 3.4): `unit(h_f - h_b) . unit(user - h_b)`.
 ///
-/// `h_f` and `h_b` are the rig's [`eyes`](Rig::eyes) and [`head_back`](Rig::head_back) carried along by the decoded head
-/// joint; `user` is the world position of the user's head. `None` when the rig has no head or a direction has no length.
+/// `h_f` and `h_b` are the rig's [`eyes`](Rig::eyes) and [`head_back`](Rig::head_back) carried
+/// along by the decoded head joint; `user` is the world position of the user's head. `None` when
+/// the rig has no head or a direction has no length.
 pub fn gaze_score(rig: &Rig, frame: &Frame, user: Vec3) -> Option<f64> {
     let head = frame.global[joint(rig, "head")?];
     let at = |offset: [f32; 3]| head.position + head.rotation * Vec3::from(offset);

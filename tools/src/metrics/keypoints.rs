@@ -22,7 +22,8 @@ impl Space {
     }
 }
 
-/// Average position error of each joint, metres (DRAM eq. 10): mean over frames of `|predicted - true|`.
+/// Average position error of each joint, metres (DRAM eq. 10): mean over frames of `|predicted -
+/// true|`.
 ///
 /// # Errors
 /// [`ErrorKind::Argument`] when the sequences differ in length or joints, or are empty.
@@ -30,8 +31,8 @@ pub fn ape(predicted: &[Frame], truth: &[Frame], space: Space) -> Result<Vec<f64
     per_joint(predicted, truth, space, |distance| distance)
 }
 
-/// Probability of correct keypoints of each joint, 0 to 1 (DRAM eq. 11): share of frames with `|predicted - true| <= sigma`
-/// (metres).
+/// Probability of correct keypoints of each joint, 0 to 1 (DRAM eq. 11): share of frames with
+/// `|predicted - true| <= sigma` (metres).
 ///
 /// # Errors
 /// As [`ape`].

@@ -1,9 +1,10 @@
-//! Symmetric matrices in `f64`: eigenvalues by Jacobi rotations, square roots. Row-major, `n` x `n`.
+//! Symmetric matrices in `f64`: eigenvalues by Jacobi rotations, square roots. Row-major, `n` x
+//! `n`.
 
 /// Eigenvalues and eigenvectors (columns of the second value) of the symmetric matrix `a`.
 ///
-/// Cyclic Jacobi (Golub and Van Loan, 8.5): each rotation zeroes one off-diagonal pair; convergence is quadratic, and
-/// eigenvalues are as exact as the matrix.
+/// Cyclic Jacobi (Golub and Van Loan, 8.5): each rotation zeroes one off-diagonal pair; convergence
+/// is quadratic, and eigenvalues are as exact as the matrix.
 pub fn eigen(a: &[f64], n: usize) -> (Vec<f64>, Vec<f64>) {
     let mut a = a.to_vec();
     let mut v: Vec<f64> = (0..n * n).map(|i| f64::from(u8::from(i / n == i % n))).collect();
@@ -46,7 +47,8 @@ fn rotate(a: &mut [f64], v: &mut [f64], n: usize, p: usize, q: usize) {
     }
 }
 
-/// Square root of a symmetric positive semidefinite matrix; eigenvalues below zero by rounding count as zero.
+/// Square root of a symmetric positive semidefinite matrix; eigenvalues below zero by rounding
+/// count as zero.
 pub fn sqrt(a: &[f64], n: usize) -> Vec<f64> {
     let (values, vectors) = eigen(a, n);
     let mut out = vec![0.0; n * n];

@@ -1,9 +1,11 @@
-//! What a motion is worth, in numbers: feet, wrists, gaze, seams, beat, distributions and distances.
+//! What a motion is worth, in numbers: feet, wrists, gaze, seams, beat, distributions and
+//! distances.
 //!
-//! Every function is pure and reads frames (or a whole [`Recording`](crate::recording::Recording)). Positions are the
-//! *decoded* joint positions ([`Frame::global`](visavis::Frame::global)), not the fixed-bone-length rig's, so that
-//! nothing is prettified. Units are metres, seconds and radians. A metric that has nothing to measure (too few frames,
-//! a joint the rig lacks, no voice, no user) is `None`, never a made-up zero.
+//! Every function is pure and reads frames (or a whole [`Recording`](crate::recording::Recording)).
+//! Positions are the *decoded* joint positions ([`Frame::global`](visavis::Frame::global)), not the
+//! fixed-bone-length rig's, so that nothing is prettified. Units are metres, seconds and radians. A
+//! metric that has nothing to measure (too few frames, a joint the rig lacks, no voice, no user) is
+//! `None`, never a synthetic zero.
 //!
 //! | metric | function | source |
 //! |---|---|---|
@@ -16,6 +18,8 @@
 //! | beat | [`beat`] | ours |
 //! | APE, PCK | [`ape`], [`pck`] | DRAM eq. 10, 11 |
 //! | bone length deviation | [`bone_deviation`] | ours |
+//! | stillness, sway and so on | [`Tally`] | recorded people |
+//! | nods | [`NodTally`] | recorded people |
 //! | joint speed | [`joint_speed`] | ours |
 //! | speaking / non-speaking | [`speech_frames`], [`is_speaking`] | SARAH 4 |
 
@@ -26,7 +30,9 @@ mod frechet;
 mod gaze;
 mod keypoints;
 mod linalg;
+mod liveliness;
 mod moments;
+mod nods;
 mod seam;
 mod speech;
 mod speed;
@@ -40,7 +46,9 @@ pub use feet::{CONTACT_HEIGHT, SLIDE_SPEED, foot_clearances, foot_slide, support
 pub use frechet::frechet;
 pub use gaze::{gaze_score, gaze_scores, head_angle};
 pub use keypoints::{Space, ape, pck};
+pub use liveliness::{BANDS, Liveliness, Tally};
 pub use moments::{Moments, acceleration_moments, pose_moments};
+pub use nods::{NodTally, Nods};
 pub use seam::{seam, switch_seam};
 pub use speech::{envelope, is_speaking, speech_frames};
 pub use speed::{JointSpeed, joint_speed, wrist_speed, wrist_speeds};
@@ -68,7 +76,8 @@ fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     (n > 0).then(|| sum / n as f64)
 }
 
-/// Arithmetic mean of two values or more, and the square of its standard error: variance (n - 1) over n.
+/// Arithmetic mean of two values or more, and the square of its standard error: variance (n - 1)
+/// over n.
 pub(crate) fn mean_and_error2(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;

@@ -34,7 +34,8 @@ impl Moments {
         &self.mean
     }
 
-    /// Takes a sample in. A sample with another number of values, or with one that is not finite, is left out.
+    /// Takes a sample in. A sample with another number of values, or with one that is not finite,
+    /// is left out.
     pub fn push(&mut self, sample: &[f64]) {
         if sample.len() != self.dim() || !sample.iter().all(|x| x.is_finite()) {
             return;
@@ -47,7 +48,8 @@ impl Moments {
         self.add_outer(&before, (n - 1.0) / n);
     }
 
-    /// Pools with the samples of `other`, as if all had been pushed here. Other dimensions are left out.
+    /// Pools with the samples of `other`, as if all had been pushed here. Other dimensions are left
+    /// out.
     pub fn merge(&mut self, other: &Self) {
         if other.count == 0 || other.dim() != self.dim() {
             return;
@@ -66,10 +68,12 @@ impl Moments {
         }
     }
 
-    /// Unbiased covariance, row-major; shrunk towards its diagonal when samples are few. `None` below two samples.
+    /// Unbiased covariance, row-major; shrunk towards its diagonal when samples are few. `None`
+    /// below two samples.
     ///
-    /// With `n` samples of `d` values the off-diagonal is multiplied by `min(1, n / (d + 1))`: below `d + 1` samples the
-    /// covariance has no full rank, and what it says about directions it never saw would pass for knowledge.
+    /// With `n` samples of `d` values the off-diagonal is multiplied by `min(1, n / (d + 1))`:
+    /// below `d + 1` samples the covariance has no full rank, and what it says about directions it
+    /// never saw would pass for knowledge.
     pub fn covariance(&self) -> Option<Vec<f64>> {
         if self.count < 2 {
             return None;
@@ -87,7 +91,8 @@ fn pose(frame: &Frame) -> impl Iterator<Item = Vec3> {
     frame.global.iter().map(|t| frame.root.to_local(t.position))
 }
 
-/// Distribution of poses for FGD (SARAH 4): joint positions in the agent's root frame, metres, one sample a frame.
+/// Distribution of poses for FGD (SARAH 4): joint positions in the agent's root frame, metres, one
+/// sample a frame.
 pub fn pose_moments(frames: &[Frame]) -> Moments {
     let mut moments = Moments::new(frames.first().map_or(0, |f| 3 * f.global.len()));
     for frame in frames {
@@ -97,8 +102,8 @@ pub fn pose_moments(frames: &[Frame]) -> Moments {
     moments
 }
 
-/// Distribution of accelerations for FGD_acc (SARAH 4): second differences of joint positions in the agent's root frame,
-/// m/s², one sample a frame but the first and the last.
+/// Distribution of accelerations for FGD_acc (SARAH 4): second differences of joint positions in
+/// the agent's root frame, m/s², one sample a frame but the first and the last.
 pub fn acceleration_moments(frames: &[Frame]) -> Moments {
     let poses: Vec<Vec<Vec3>> = frames.iter().map(|frame| pose(frame).collect()).collect();
     let mut moments = Moments::new(poses.first().map_or(0, |p| 3 * p.len()));

@@ -5,15 +5,16 @@ use visavis::{BLOCK_FRAMES, Frame};
 
 /// Mean joint acceleration across block boundaries over that inside blocks; 1 means seamless.
 ///
-/// Acceleration is the second difference of world positions. Of a block's four centred differences two reach over a
-/// boundary (around its first and its last frame) and two lie inside. `None` for less than a block, or when nothing inside
-/// blocks accelerates (below 1e-9 m/frame²), where the ratio says nothing.
+/// Acceleration is the second difference of world positions. Of a block's four centred differences
+/// two reach over a boundary (around its first and its last frame) and two lie inside. `None` for
+/// less than a block, or when nothing inside blocks accelerates (below 1e-9 m/frame²), where the
+/// ratio says nothing.
 pub fn seam(frames: &[Frame]) -> Option<f64> {
     ratio(frames, |w| crosses(w[1].index))
 }
 
-/// The same across those boundaries alone at which the sampler changes: how well a governor's steps are hidden. `None` where it
-/// never changes, and as [`seam`].
+/// The same across those boundaries alone at which the sampler changes: how well a governor's steps
+/// are hidden. `None` where it never changes, and as [`seam`].
 pub fn switch_seam(frames: &[Frame]) -> Option<f64> {
     ratio(frames, |w| crosses(w[1].index) && w[0].sampler != w[2].sampler)
 }
@@ -50,8 +51,9 @@ mod tests {
 
     #[test]
     fn a_jump_at_every_boundary_is_counted() {
-        // Inside blocks x = k² / 4 gives 0.5; each boundary adds a step of 1 to both differences that reach over it.
-        // Around the first frame of a block the step counts -1, around the last +1: |0.5 - 1| and |0.5 + 1|, mean 1.
+        // Inside blocks x = k² / 4 gives 0.5; each boundary adds a step of 1 to both differences
+        // that reach over it. Around the first frame of a block the step counts -1, around the last
+        // +1: |0.5 - 1| and |0.5 + 1|, mean 1.
         let r = recording(42, |i, _, p| {
             p.iter_mut().for_each(|p| p.x += 0.25 * (i * i) as f32 + (i / BLOCK_FRAMES) as f32);
         });

@@ -5,12 +5,14 @@ use visavis::internals::frame::FRAME_SAMPLES;
 
 /// Frames quieter than this are not speech, RMS of full scale (-45 dB).
 const FLOOR: f64 = 0.005_623;
-/// Frames quieter than the voice's loud frames (95th percentile) by this factor are not speech (-30 dB).
+/// Frames quieter than the voice's loud frames (95th percentile) by this factor are not speech (-30
+/// dB).
 const BELOW_LOUD: f64 = 0.031_623;
 /// Pauses up to twice this long belong to the speech around them, seconds.
 const HANGOVER: f64 = 0.2;
 
-/// Root-mean-square level of a 24 kHz mono voice in each of the first `frames` frames, 0 to 1; zero past its end.
+/// Root-mean-square level of a 24 kHz mono voice in each of the first `frames` frames, 0 to 1; zero
+/// past its end.
 pub fn envelope(voice: &[f32], frames: usize) -> Vec<f64> {
     (0..frames)
         .map(|i| {
@@ -22,8 +24,8 @@ pub fn envelope(voice: &[f32], frames: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Which frames are speech: louder than -45 dB of full scale and than 30 dB below the voice's own loud frames, or within
-/// 0.2 s of such a frame.
+/// Which frames are speech: louder than -45 dB of full scale and than 30 dB below the voice's own
+/// loud frames, or within 0.2 s of such a frame.
 pub fn speech_frames(voice: &[f32], frames: usize) -> Vec<bool> {
     let levels = envelope(voice, frames);
     let mut sorted = levels.clone();
@@ -35,7 +37,8 @@ pub fn speech_frames(voice: &[f32], frames: usize) -> Vec<bool> {
     (0..frames).map(active).collect()
 }
 
-/// Whether a clip counts as speaking (S) rather than non-speaking (NS): at least half of its frames are speech.
+/// Whether a clip counts as speaking (S) rather than non-speaking (NS): at least half of its frames
+/// are speech.
 ///
 /// SARAH 4 classifies clips by the agent's audio energy and leaves the threshold open.
 pub fn is_speaking(voice: &[f32], frames: usize) -> bool {

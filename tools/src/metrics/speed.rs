@@ -24,8 +24,8 @@ pub fn joint_speed(frames: &[Frame]) -> Option<JointSpeed> {
     Some(JointSpeed { mean: mean(speeds())?, max: speeds().fold(0.0, f64::max) })
 }
 
-/// Speed of the wrists between each frame and the one before, m/s: the mean of both hand joints, one value less than
-/// there are frames. `None` when the rig has no hands.
+/// Speed of the wrists between each frame and the one before, m/s: the mean of both hand joints,
+/// one value less than there are frames. `None` when the rig has no hands.
 pub fn wrist_speeds(rig: &Rig, frames: &[Frame]) -> Option<Vec<f64>> {
     let wrists: Vec<usize> = ["leftHand", "rightHand"].iter().filter_map(|name| joint(rig, name)).collect();
     let speed = |pair: &[Frame]| {
@@ -36,8 +36,8 @@ pub fn wrist_speeds(rig: &Rig, frames: &[Frame]) -> Option<Vec<f64>> {
 
 /// Wrist variance as SARAH 4 defines it: mean wrist speed of both wrists, m/s.
 ///
-/// The paper gives no unit with its figures (105.0, ground truth 137.6); millimetres a second, a thousand times this
-/// value, is the one in which they are plausible.
+/// The paper gives no unit with its figures (105.0, ground truth 137.6); millimetres a second, a
+/// thousand times this value, is the one in which they are plausible.
 pub fn wrist_speed(rig: &Rig, frames: &[Frame]) -> Option<f64> {
     mean(wrist_speeds(rig, frames)?)
 }

@@ -31,7 +31,8 @@ pub struct Summary {
     pub bone_deviation: Option<BoneDeviation>,
     /// Speed of all joints, m/s ([`joint_speed`]).
     pub joint_speed: Option<JointSpeed>,
-    /// Largest distance between a decoded joint and the fixed-bone-length rig's, over all frames, metres.
+    /// Largest distance between a decoded joint and the fixed-bone-length rig's, over all frames,
+    /// metres.
     pub max_fit_error: Option<f64>,
     /// Frames in which the agent speaks; `None` without an agent voice.
     pub speaking: Option<Split>,
@@ -78,7 +79,8 @@ impl Summary {
 
     /// Pretty-printed JSON with a final newline, the content of `metrics.json`.
     pub fn to_json(&self) -> String {
-        // Only maps with keys that are no strings and failing writers make this fail; there is neither.
+        // Only maps with keys that are no strings and failing writers make this fail; there is
+        // neither.
         serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
     }
 }
@@ -105,7 +107,8 @@ mod tests {
     use super::*;
     use glam::Vec3;
 
-    /// Two seconds of gesturing speech at 0.6 m/s, then two of silent rest; the user straight ahead.
+    /// Two seconds of gesturing speech at 0.6 m/s, then two of silent rest; the user straight
+    /// ahead.
     fn conversation() -> Recording {
         let mut r = recording(120, |i, _, p| (2..4).for_each(|j| p[j].y += i.min(60) as f32 * 0.02));
         r.agent_voice = Some((0..120 * 800).map(|i| if i < 48_000 { (i as f32).sin() } else { 0.0 }).collect());

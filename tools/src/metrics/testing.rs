@@ -4,7 +4,8 @@ use crate::recording::Recording;
 use glam::{Quat, Vec3};
 use visavis::{FPS, Frame, Joint, Rig, Root, Transform};
 
-/// Seven joints: hips, head, both hands, left foot and toes, right foot. Eyes and head back 10 cm before and behind.
+/// Seven joints: hips, head, both hands, left foot and toes, right foot. Eyes and head back 10 cm
+/// before and behind.
 pub fn rig() -> Rig {
     let joint = |name: &str, parent, offset| Joint { name: name.into(), parent, offset };
     Rig {
@@ -22,7 +23,8 @@ pub fn rig() -> Rig {
     }
 }
 
-/// `n` frames at rest, each changed by `change(i, seconds, positions)`; positions are indexed as the joints.
+/// `n` frames at rest, each changed by `change(i, seconds, positions)`; positions are indexed as
+/// the joints.
 pub fn recording(n: usize, change: impl Fn(usize, f32, &mut [Vec3])) -> Recording {
     let rig = rig();
     let mut rest: Vec<Vec3> = Vec::new();

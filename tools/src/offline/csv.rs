@@ -17,13 +17,14 @@ pub struct UserPath {
 }
 
 impl UserPath {
-    /// Reads a CSV file: the header `t,x,y,z`, then seconds and metres (world, Y up), at any rate. Byte order mark,
-    /// CRLF, blank lines and spaces around values are fine.
+    /// Reads a CSV file: the header `t,x,y,z`, then seconds and metres (world, Y up), at any rate.
+    /// Byte order mark, CRLF, blank lines and spaces around values are fine.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`] when the file cannot be read; [`ErrorKind::UserPath`], naming file and line, for a missing or
-    /// different header, a wrong number of columns, text or NaN for a number, a time that is not later than the line before,
-    /// a position beyond 1 km, or no positions at all.
+    /// [`ErrorKind::Io`] when the file cannot be read; [`ErrorKind::UserPath`], naming file and
+    /// line, for a missing or different header, a wrong number of columns, text or NaN for a
+    /// number, a time that is not later than the line before, a position beyond 1 km, or no
+    /// positions at all.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = visavis::internals::bounded::read(path, MAX_BYTES)
@@ -64,7 +65,8 @@ impl UserPath {
     /// A path of positions (m) at times (s).
     ///
     /// # Errors
-    /// [`ErrorKind::UserPath`] when there are none, when times do not ascend, or for a value that is not finite.
+    /// [`ErrorKind::UserPath`] when there are none, when times do not ascend, or for a value that
+    /// is not finite.
     pub fn from_points(points: Vec<(f64, Vec3)>) -> Result<Self> {
         let finite = points.iter().all(|(t, p)| t.is_finite() && p.is_finite());
         if points.is_empty() || !finite || points.windows(2).any(|w| w[1].0 <= w[0].0) {
@@ -83,9 +85,11 @@ impl UserPath {
         self.points.last().map_or(0.0, |p| p.0)
     }
 
-    /// The head at `time` (s), linear between positions; `None` outside the path and inside gaps of more than half a second.
+    /// The head at `time` (s), linear between positions; `None` outside the path and inside gaps of
+    /// more than half a second.
     ///
-    /// For tools that know the whole path; a session tracks the head as it comes and does not look ahead.
+    /// For tools that know the whole path; a session tracks the head as it comes and does not look
+    /// ahead.
     pub fn at(&self, time: f64) -> Option<Vec3> {
         let after = self.points.partition_point(|p| p.0 <= time);
         let &(t0, p0) = self.points.get(after.checked_sub(1)?)?;

@@ -1,11 +1,13 @@
-//! Whole files in, a [`Recording`] out: what the command line does, for programs that work on finished recordings.
+//! Whole files in, a [`Recording`] out: what the command line does, for programs that work on
+//! finished recordings.
 //!
 //! ```text
 //! Conversation (voices at 24 kHz, path) -> run(session) -> Outcome (recording, statistics) -> OutputFolder -> files
 //! ```
 //!
-//! A [`Session`] is driven exactly as a live caller drives it: sound and head positions are pushed in order and each
-//! block is polled when it is due, so an offline run gives the motion that a live one would have given.
+//! A [`Session`] is driven exactly as a live caller drives it: sound and head positions are pushed
+//! in order and each block is polled when it is due, so an offline run gives the motion that a live
+//! one would have given.
 //!
 //! ```no_run
 //! # fn main() -> visavis::Result<()> {
@@ -39,10 +41,12 @@ use visavis::internals::quant::Scene;
 use visavis::stats::SessionStats;
 use visavis::{BLOCK_FRAMES, Error, ErrorKind, FPS, Result, SAMPLE_RATE, Session};
 
-/// Longest conversation that is taken, seconds: longer ones are wrong units or clock times more often than they are meant.
+/// Longest conversation that is taken, seconds: longer ones are wrong units or clock times more
+/// often than they are meant.
 pub const MAX_SECONDS: f64 = 2.0 * 3600.0;
 
-/// What one conversation sounds and looks like; at least one of the three is there, and it is longer than nothing.
+/// What one conversation sounds and looks like; at least one of the three is there, and it is
+/// longer than nothing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conversation {
     agent: Option<Vec<f32>>,
@@ -51,8 +55,9 @@ pub struct Conversation {
 }
 
 impl Conversation {
-    /// Reads the agent's voice, the user's voice (WAV, see [`Wav::read`]) and the path of the user's head (CSV, see
-    /// [`UserPath::read`]). What is `None` is absent, which is not the same as silent or far away.
+    /// Reads the agent's voice, the user's voice (WAV, see [`Wav::read`]) and the path of the
+    /// user's head (CSV, see [`UserPath::read`]). What is `None` is absent, which is not the same
+    /// as silent or far away.
     ///
     /// # Errors
     /// Those of the readers, and of [`Conversation::new`], naming the file.
@@ -75,11 +80,13 @@ impl Conversation {
         })
     }
 
-    /// A conversation from voices at 24 kHz mono (full scale 1, finite, sample `n` at `n / 24000` s) and a path.
+    /// A conversation from voices at 24 kHz mono (full scale 1, finite, sample `n` at `n / 24000`
+    /// s) and a path.
     ///
     /// # Errors
-    /// [`ErrorKind::Argument`] when there is nothing at all; [`ErrorKind::UserPath`] when the path is all there is and
-    /// ends at or before 0 s; either when a part is longer than [`MAX_SECONDS`].
+    /// [`ErrorKind::Argument`] when there is nothing at all; [`ErrorKind::UserPath`] when the path
+    /// is all there is and ends at or before 0 s; either when a part is longer than
+    /// [`MAX_SECONDS`].
     pub fn new(agent: Option<Vec<f32>>, user: Option<Vec<f32>>, path: Option<UserPath>) -> Result<Self> {
         let talk = Self { agent, user, path };
         talk.lengths().into_iter().flatten().try_for_each(check_length)?;
@@ -115,7 +122,8 @@ impl Conversation {
 
     /// Frames of motion that cover it, at 30 fps.
     pub fn frames(&self) -> usize {
-        // The tolerance keeps a length such as 0.1 s, which is no binary fraction, from costing a frame.
+        // The tolerance keeps a length such as 0.1 s, which is no binary fraction, from costing a
+        // frame.
         (self.seconds() * f64::from(FPS) - 1e-6).ceil().max(0.0) as usize
     }
 
@@ -129,7 +137,8 @@ impl Conversation {
         self.user.as_deref()
     }
 
-    /// The first `blocks` blocks (all of them when there are fewer) as the quantiser takes them, with a gaze target or none.
+    /// The first `blocks` blocks (all of them when there are fewer) as the quantiser takes them,
+    /// with a gaze target or none.
     ///
     /// # Errors
     /// [`ErrorKind::Argument`] when there is not a whole block.
@@ -189,9 +198,11 @@ impl Outcome {
     }
 }
 
-/// Resets `session`, plays the whole conversation to it and returns the motion; `progress` is called after each block.
+/// Resets `session`, plays the whole conversation to it and returns the motion; `progress` is
+/// called after each block.
 ///
-/// Voices come a block ahead, as from text-to-speech; the session itself never uses the user's future.
+/// Voices come a block ahead, as from text-to-speech; the session itself never uses the user's
+/// future.
 ///
 /// # Errors
 /// Those of pushing and polling; none for finite voices and a session that was just made.

@@ -12,8 +12,9 @@ pub const FILES: [&str; 5] = ["index.html", "motion.bvh", "motion.glb", "motion.
 
 /// The folder that results go to, known to be writable before anything is computed.
 ///
-/// Files are made in a hidden folder inside it and renamed when all of them are whole. What an earlier run left there stays
-/// untouched until then. Dropped before [`OutputFolder::write`] has succeeded, it removes all that it made.
+/// Files are made in a hidden folder inside it and renamed when all of them are whole. What an
+/// earlier run left there stays untouched until then. Dropped before [`OutputFolder::write`] has
+/// succeeded, it removes all that it made.
 #[derive(Debug)]
 pub struct OutputFolder {
     folder: PathBuf,
@@ -23,11 +24,12 @@ pub struct OutputFolder {
 }
 
 impl OutputFolder {
-    /// Makes `folder` with its parents where they are missing, and makes sure that files can be written there.
+    /// Makes `folder` with its parents where they are missing, and makes sure that files can be
+    /// written there.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`] naming the folder that is a file or cannot be made or written, or the name among [`FILES`] that a
-    /// folder occupies.
+    /// [`ErrorKind::Io`] naming the folder that is a file or cannot be made or written, or the name
+    /// among [`FILES`] that a folder occupies.
     pub fn prepare(folder: impl AsRef<Path>) -> Result<Self> {
         let folder = folder.as_ref();
         let mut this = Self { folder: folder.to_path_buf(), staging: PathBuf::new(), made: Vec::new() };
@@ -61,7 +63,8 @@ impl OutputFolder {
     /// Writes all of [`FILES`] and returns their paths in that order.
     ///
     /// # Errors
-    /// Those of the writers, and [`ErrorKind::Io`] when a finished file cannot be moved to its name.
+    /// Those of the writers, and [`ErrorKind::Io`] when a finished file cannot be moved to its
+    /// name.
     pub fn write(self, recording: &Recording, meta: &Meta, summary: &Summary) -> Result<[PathBuf; 5]> {
         if recording.frames.is_empty() {
             return Err(Error::new(ErrorKind::Argument, "there are no frames to write"));
@@ -85,7 +88,8 @@ impl OutputFolder {
 
 impl Drop for OutputFolder {
     fn drop(&mut self) {
-        // Best effort: the error that led here is the one to report. Folders that hold something by now are kept.
+        // Best effort: the error that led here is the one to report. Folders that hold something by
+        // now are kept.
         if !self.staging.as_os_str().is_empty() {
             let _ = std::fs::remove_dir_all(&self.staging);
         }

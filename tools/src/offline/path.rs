@@ -4,15 +4,17 @@ use crate::offline::UserPath;
 use glam::Vec3;
 use visavis::internals::user::{HOLD_SECONDS, TELEPORT_SPEED};
 
-/// Positions further apart in time than this are filled in, seconds; head trackers send 72 to 120 positions a second.
+/// Positions further apart in time than this are filled in, seconds; head trackers send 72 to 120
+/// positions a second.
 const SPARSE: f64 = 1.0 / 60.0;
 /// Rate at which they are filled in, Hz.
 const RATE: f64 = 90.0;
 
-/// The points of `path` (seconds, metres) for a session, which never looks ahead: between the points of a slow
-/// recording it would hold each position until the next one comes. So where neighbours are more than 1/60 s apart, positions
-/// at 90 Hz or more are put in between, in a straight line. Gaps of more than half a second and jumps faster than 12 m/s
-/// stay as they are, for the session to judge.
+/// The points of `path` (seconds, metres) for a session, which never looks ahead: between the
+/// points of a slow recording it would hold each position until the next one comes. So where
+/// neighbours are more than 1/60 s apart, positions at 90 Hz or more are put in between, in a
+/// straight line. Gaps of more than half a second and jumps faster than 12 m/s stay as they are,
+/// for the session to judge.
 pub fn for_session(path: &UserPath) -> Vec<(f64, Vec3)> {
     let points = path.points();
     let mut out = Vec::with_capacity(points.len());

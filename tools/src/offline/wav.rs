@@ -7,8 +7,8 @@ use visavis::{Error, ErrorKind, Result};
 
 /// Most channels that are mixed down.
 const MAX_CHANNELS: u16 = 8;
-/// Loudest sample of a float file, full scale 1: as loud as a 32-bit number read without its scale. What is far beyond is no sound, and
-/// adding channels or filtering would make infinities of it.
+/// Loudest sample of a float file, full scale 1: as loud as a 32-bit number read without its scale.
+/// What is far beyond is no sound, and adding channels or filtering would make infinities of it.
 const LOUDEST: f32 = (1u64 << 32) as f32;
 /// Longest file that is read, bytes.
 const MAX_BYTES: u64 = 1 << 30;
@@ -23,12 +23,13 @@ pub struct Wav {
 }
 
 impl Wav {
-    /// Reads `path`: PCM of 8, 16, 24 or 32 bits or 32-bit float, one to eight channels (averaged), 8 to 192 kHz, at most
-    /// 1 GiB.
+    /// Reads `path`: PCM of 8, 16, 24 or 32 bits or 32-bit float, one to eight channels (averaged),
+    /// 8 to 192 kHz, at most 1 GiB.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`] when the file cannot be read; [`ErrorKind::Audio`], naming the file, when it is empty, not WAV,
-    /// of a format not listed above, cut off (fewer samples than its header says), or holds NaN, infinity or what is no sound.
+    /// [`ErrorKind::Io`] when the file cannot be read; [`ErrorKind::Audio`], naming the file, when
+    /// it is empty, not WAV, of a format not listed above, cut off (fewer samples than its header
+    /// says), or holds NaN, infinity or what is no sound.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = visavis::internals::bounded::read(path, MAX_BYTES)
@@ -134,7 +135,8 @@ struct Chunks<'a> {
 }
 
 impl<'a> Chunks<'a> {
-    /// Refuses an extensible format (`0xFFFE`) that claims more valid bits than its samples have, or none.
+    /// Refuses an extensible format (`0xFFFE`) that claims more valid bits than its samples have,
+    /// or none.
     fn check_width(&self) -> Result<()> {
         let field = |at: usize| self.format.get(8 + at..10 + at).map_or(0, |b| u16::from_le_bytes([b[0], b[1]]));
         let (kind, container, valid) = (field(0), field(14), field(18));

@@ -30,11 +30,13 @@ pub struct Measures {
     pub name: String,
     /// Frechet distance of its poses from the reference's run, m²; of the reference none.
     pub fgd: Option<f64>,
-    /// Frechet distance of its joint accelerations from the reference's run, (m/s²)²; of the reference none.
+    /// Frechet distance of its joint accelerations from the reference's run, (m/s²)²; of the
+    /// reference none.
     pub fgd_acceleration: Option<f64>,
     /// Metrics of its motion, as in `metrics.json`.
     pub summary: Summary,
-    /// Distance of joints from the reference's at the same time, millimetres: mean over each piece of the run.
+    /// Distance of joints from the reference's at the same time, millimetres: mean over each piece
+    /// of the run.
     pub divergence_mm: Vec<f64>,
     /// The same relative to the root: what differs of the posture.
     pub posture_mm: Spread,

@@ -1,4 +1,5 @@
-//! Every metric of `visavis eval` side by side: the JSON that it wrote for the reference and for each candidate.
+//! Every metric of `visavis eval` side by side: the JSON that it wrote for the reference and for
+//! each candidate.
 
 use crate::metrics::mean_and_error2;
 use serde::Serialize;
@@ -9,7 +10,8 @@ use visavis::{Error, ErrorKind, Result};
 /// Evaluations on the same clips.
 #[derive(Debug, Clone, Serialize)]
 pub struct Judged {
-    /// Files that were read, the reference's first; last, where there is one, that of the reference with another seed.
+    /// Files that were read, the reference's first; last, where there is one, that of the reference
+    /// with another seed.
     pub files: Vec<String>,
     /// What was measured, as `row: class: metric`, and its value in each file.
     pub metrics: Vec<(String, Vec<Option<f64>>)>,
@@ -19,7 +21,8 @@ pub struct Judged {
     pub chance: Option<Vec<FgdChange>>,
 }
 
-/// What becomes of a sampler's Frechet distance to the corpus (FGD), relative to the reference's: `(d' - d) / d`.
+/// What becomes of a sampler's Frechet distance to the corpus (FGD), relative to the reference's:
+/// `(d' - d) / d`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FgdChange {
     /// The sampler.
@@ -28,7 +31,8 @@ pub struct FgdChange {
     pub reference: f64,
     /// Relative change.
     pub change: f64,
-    /// Standard error of the change, from what batches of the same windows differ by; none with fewer than two batches.
+    /// Standard error of the change, from what batches of the same windows differ by; none with
+    /// fewer than two batches.
     pub error: Option<f64>,
 }
 
@@ -36,8 +40,8 @@ impl Judged {
     /// Reads one file a bundle, and one of the reference with another seed.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`] for a file that cannot be read, [`ErrorKind::Argument`] for one that is no evaluation, or is of other clips or of
-    /// another number of windows than the first.
+    /// [`ErrorKind::Io`] for a file that cannot be read, [`ErrorKind::Argument`] for one that is no
+    /// evaluation, or is of other clips or of another number of windows than the first.
     pub(super) fn read(files: &[PathBuf], other_seed: Option<&Path>) -> Result<Self> {
         let all: Vec<&Path> = files.iter().map(PathBuf::as_path).chain(other_seed).collect();
         let values = all.iter().map(|file| parse(file)).collect::<Result<Vec<_>>>()?;
@@ -110,7 +114,8 @@ fn parse(file: &Path) -> Result<Value> {
     if value["rows"].is_array() { Ok(value) } else { Err(bad("it has no rows".to_owned())) }
 }
 
-/// Rows of motion that the model made with free gaze; the corpus and what was looked up in it are the same for all bundles.
+/// Rows of motion that the model made with free gaze; the corpus and what was looked up in it are
+/// the same for all bundles.
 fn generated(evaluation: &Value) -> impl Iterator<Item = &Value> {
     evaluation["rows"].as_array().into_iter().flatten().filter(|row| {
         let name = row["name"].as_str().unwrap_or_default();

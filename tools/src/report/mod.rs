@@ -1,4 +1,5 @@
-//! The accuracy report: what quantised bundles do to the numbers, the blocks and the motion of a reference bundle, and what they cost.
+//! The accuracy report: what quantised bundles do to the numbers, the blocks and the motion of a
+//! reference bundle, and what they cost.
 //!
 //! | file | what |
 //! |---|---|
@@ -50,7 +51,8 @@ pub struct Options<'a> {
     pub timed: usize,
     /// Numerics of another machine, to be compared with those of this one.
     pub other: Option<Numerics>,
-    /// What `visavis eval --json` wrote for the reference and for each candidate on the same clips; none, or one each.
+    /// What `visavis eval --json` wrote for the reference and for each candidate on the same clips;
+    /// none, or one each.
     pub eval: Vec<PathBuf>,
     /// The same for the reference with another seed: what chance alone changes.
     pub eval_other_seed: Option<PathBuf>,
@@ -90,7 +92,8 @@ pub struct Report {
 /// Measures all of it.
 ///
 /// # Errors
-/// Those of loading; [`ErrorKind::Argument`] when a candidate has another rig or other sizes than the reference.
+/// Those of loading; [`ErrorKind::Argument`] when a candidate has another rig or other sizes than
+/// the reference.
 pub fn run(options: &Options<'_>) -> Result<Report> {
     if !options.eval.is_empty() && options.eval.len() != 1 + options.candidates.len() {
         let message = "evaluations: give one of the reference, then one of each candidate, or none";
@@ -187,7 +190,8 @@ fn matrices(loaded: &Loaded) -> Result<String> {
     Ok(schemes.join(", "))
 }
 
-/// `talk` one time after the other until it lasts `minutes`; the user's path goes back and forth, so that nobody jumps.
+/// `talk` one time after the other until it lasts `minutes`; the user's path goes back and forth,
+/// so that nobody jumps.
 fn repeated(talk: &Conversation, minutes: f64) -> Result<Conversation> {
     let times = (minutes * 60.0 / talk.seconds()).ceil().max(1.0) as usize;
     let length = talk.frames() * visavis::internals::frame::FRAME_SAMPLES;

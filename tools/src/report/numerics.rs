@@ -1,4 +1,5 @@
-//! Numbers that depend on the bundles alone, not on the machine: tensors, layer outputs, teacher-forced blocks.
+//! Numbers that depend on the bundles alone, not on the machine: tensors, layer outputs,
+//! teacher-forced blocks.
 
 use super::spread::{Spread, cosine, sqnr};
 use serde::{Deserialize, Serialize};

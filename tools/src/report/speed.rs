@@ -17,11 +17,13 @@ pub struct Speed {
     pub weight_bytes: usize,
     /// Bytes of a session's key-value caches.
     pub cache_bytes: usize,
-    /// For each sampler: its name, bytes of weights that a block reads, median milliseconds of a block, and that over the reference's.
+    /// For each sampler: its name, bytes of weights that a block reads, median milliseconds of a
+    /// block, and that over the reference's.
     pub samplers: Vec<(String, usize, f64, f64)>,
 }
 
-/// Times `blocks` blocks of each bundle and sampler, one block of each in turn, so that what else the machine does strikes all alike.
+/// Times `blocks` blocks of each bundle and sampler, one block of each in turn, so that what else
+/// the machine does strikes all alike.
 pub(super) fn measure(loaded: &[&Loaded], blocks: usize, progress: &dyn Fn(&str)) -> Result<Vec<Speed>> {
     let mut speeds: Vec<_> = (loaded.iter())
         .map(|l| Speed {

@@ -1,9 +1,10 @@
 //! Drift of a metric over the cycles of a soak, told from the spread between cycles.
 //!
-//! Ten minutes of bursty motion are few: the mean joint speed of neighbouring cycles differs by 15 %, the share of sliding feet by 20 %,
-//! with no trend. So halves of the run are compared, not single cycles, and a difference counts as drift for so much of it as
-//! chance does not explain: all but two standard errors, which come from the spread of the cycles *within* the halves and so do not
-//! grow with the drift itself. The longer the soak, the less there is to excuse.
+//! Ten minutes of bursty motion are few: the mean joint speed of neighbouring cycles differs by 15
+//! %, the share of sliding feet by 20 %, with no trend. So halves of the run are compared, not
+//! single cycles, and a difference counts as drift for so much of it as chance does not explain:
+//! all but two standard errors, which come from the spread of the cycles *within* the halves and so
+//! do not grow with the drift itself. The longer the soak, the less there is to excuse.
 
 use crate::metrics::mean_and_error2;
 
@@ -22,7 +23,8 @@ pub(super) struct Drift {
 }
 
 impl Drift {
-    /// Of the values of the cycles in order; `None` where they are too few. A middle cycle belongs to no half.
+    /// Of the values of the cycles in order; `None` where they are too few. A middle cycle belongs
+    /// to no half.
     pub(super) fn of(values: &[f64]) -> Option<Self> {
         let half = values.len() / 2;
         if half < CYCLES {

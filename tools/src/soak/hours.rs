@@ -1,17 +1,22 @@
 //! What the hour changes: nothing but the rounding of keys.
 //!
-//! A session knows the time by the indices of its tokens, frames and samples. Those of tokens enter the networks as rotary phases,
-//! and attention sees their differences alone. Two things can be held against that.
+//! A session knows the time by the indices of its tokens, frames and samples. Those of tokens enter
+//! the networks as rotary phases, and attention sees their differences alone. Two things can be
+//! held against that.
 //!
-//! - *To the bit.* All phases come again after [`PERIOD`] tokens. So a session that starts that many blocks later must show the same
-//!   motion, bit for bit, over as many blocks as one likes: time stamps, noise counters, resamplers, re-anchoring and the
-//!   integration of the root are part of it.
-//! - *Within a period* a key is turned by its own angle and then rounded to f16, so that motion at hour 24 cannot have the bits of hour 0,
-//!   nor can motion that starts one token later. Generated motion feeds on itself and amplifies the last bit without end (as
-//!   Lorenz 1963), so free-running sessions cannot be compared. One block on the same history can: what it changes by in the two hours
-//!   after a day must be no more than what it changes by in the first two. Both are taken over a whole turn of the slowest phase: a few
-//!   tokens hardly turn the slow ones, so that their keys keep their rounding, and neighbouring places share theirs. The largest of
-//!   the distances is told, not judged: it is where the model is most sensitive to its keys, and as large in the first hours.
+//! - *To the bit.* All phases come again after [`PERIOD`] tokens. So a session that starts that
+//!   many blocks later must show the same motion, bit for bit, over as many blocks as one likes:
+//!   time stamps, noise counters, resamplers, re-anchoring and the integration of the root are part
+//!   of it.
+//! - *Within a period* a key is turned by its own angle and then rounded to f16, so that motion at
+//!   hour 24 cannot have the bits of hour 0, nor can motion that starts one token later. Generated
+//!   motion feeds on itself and amplifies the last bit without end (as Lorenz 1963), so
+//!   free-running sessions cannot be compared. One block on the same history can: what it changes
+//!   by in the two hours after a day must be no more than what it changes by in the first two. Both
+//!   are taken over a whole turn of the slowest phase: a few tokens hardly turn the slow ones, so
+//!   that their keys keep their rounding, and neighbouring places share theirs. The largest of the
+//!   distances is told, not judged: it is where the model is most sensitive to its keys, and as
+//!   large in the first hours.
 
 use super::Voices;
 use glam::Vec3;
@@ -26,8 +31,9 @@ use visavis::{BLOCK_FRAMES, Engine, FPS, Frame, Result, Sampler, Session, Sessio
 const DAY: u64 = 24 * 3600 * FPS as u64 / BLOCK_FRAMES as u64;
 /// Blocks that are compared to the bit; re-anchored every eight.
 const BLOCKS: usize = 40;
-/// Places within the first two hours, and after the day, that single blocks are made at, and the blocks between them: together
-/// 48,352 tokens, in which the slowest phase of a head of 64 channels turns once (47,117 tokens). A prime, so that no phase turns evenly.
+/// Places within the first two hours, and after the day, that single blocks are made at, and the
+/// blocks between them: together 48,352 tokens, in which the slowest phase of a head of 64 channels
+/// turns once (47,117 tokens). A prime, so that no phase turns evenly.
 const PLACES: u64 = 32;
 const APART: u64 = 1511;
 /// Noises of such a block.
@@ -40,8 +46,8 @@ pub struct Hours {
     pub period_blocks: u64,
     /// Frames in which a session that starts a period later differs in any bit.
     pub period_frames_that_differ: usize,
-    /// Distance between joints of one block at the session's start and within the two hours after it: root mean square and largest,
-    /// metres.
+    /// Distance between joints of one block at the session's start and within the two hours after
+    /// it: root mean square and largest, metres.
     pub hours_later: [f64; 2],
     /// The same within the two hours after a day.
     pub day_later: [f64; 2],
@@ -117,7 +123,8 @@ fn talk(engine: &Arc<Engine>, voices: &Voices, sampler: Sampler, first_block: u6
     Ok(frames)
 }
 
-/// The first block at `first_block` under several noises: its history is the bundle's idle clip, whenever it is.
+/// The first block at `first_block` under several noises: its history is the bundle's idle clip,
+/// whenever it is.
 fn single_blocks(engine: &Arc<Engine>, voices: &Voices, sampler: Sampler, first_block: u64) -> Result<Vec<Frame>> {
     let diagnostics = Diagnostics { first_block, ..Default::default() };
     let mut session = engine.session(SessionOptions { sampler, diagnostics, ..Default::default() })?;

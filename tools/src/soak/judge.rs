@@ -8,7 +8,8 @@ use visavis::{BLOCK_FRAMES, FPS};
 
 /// Growth of resident memory that is allowed.
 const MEMORY_GROWTH: f64 = 0.01;
-/// Difference between the first and the last half of the cycles that is allowed beyond what chance explains.
+/// Difference between the first and the last half of the cycles that is allowed beyond what chance
+/// explains.
 const DRIFT: f64 = 0.15;
 /// Soaks that are shorter have cycles too short to be compared, hours.
 const DRIFT_HOURS: f64 = 2.0 / 3.0;
@@ -18,7 +19,8 @@ const SUPPORT: f64 = 0.02;
 pub(super) const SWITCH_SEAM: f64 = 1.2;
 /// Distance by which a day of token indices may move joints of one block, root mean square, metres.
 const PRECISION: f64 = 0.005;
-/// How often what the first hours change a day may change; means of 32 places under eight noises differ by a tenth by chance.
+/// How often what the first hours change a day may change; means of 32 places under eight noises
+/// differ by a tenth by chance.
 const DAY: f64 = 1.5;
 
 /// One thing that was judged.
@@ -47,7 +49,8 @@ pub struct Report {
     pub block_ms: [f64; 4],
     /// Times that the session re-anchored.
     pub anchorings: u64,
-    /// Resident memory at its highest in the second and third tenth of the run, and after them, bytes; `None` where it cannot be told.
+    /// Resident memory at its highest in the second and third tenth of the run, and after them,
+    /// bytes; `None` where it cannot be told.
     pub resident_bytes: Option<[u64; 2]>,
     /// Allocations while blocks were computed, warm-up excepted; `None` where nobody counts.
     pub allocations: Option<u64>,
@@ -87,8 +90,8 @@ impl Memory {
     }
 }
 
-/// Resident bytes of this process, where the system tells, but for pages of files: those of the program come as its parts are first used,
-/// and go as the system likes.
+/// Resident bytes of this process, where the system tells, but for pages of files: those of the
+/// program come as its parts are first used, and go as the system likes.
 fn resident() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("RssAnon:"))?;

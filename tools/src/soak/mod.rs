@@ -1,8 +1,9 @@
 //! Soak: hours of varied conversation as fast as they compute, judged.
 //!
-//! One session is driven through cycles of ten minutes in which everything changes: who speaks, sample rates, silence, a missing
-//! voice, a lost tracker, gaze targets, a user who walks, stands and teleports, samplers. A second session on the same engine
-//! runs beside it and is reset again and again. Judged are
+//! One session is driven through cycles of ten minutes in which everything changes: who speaks,
+//! sample rates, silence, a missing voice, a lost tracker, gaze targets, a user who walks, stands
+//! and teleports, samplers. A second session on the same engine runs beside it and is reset again
+//! and again. Judged are
 //!
 //! | verdict | holds when |
 //! |---|---|
@@ -64,7 +65,8 @@ pub struct Soak {
 pub type Allocations = fn() -> u64;
 
 impl Soak {
-    /// Runs it; `voices` are what the two say, over and over, and `progress` is told the hours done now and then.
+    /// Runs it; `voices` are what the two say, over and over, and `progress` is told the hours done
+    /// now and then.
     ///
     /// # Errors
     /// [`ErrorKind::Argument`] for hours out of range; those of a session.

@@ -1,7 +1,7 @@
 //! What happens when in a cycle.
 
 use glam::Vec3;
-use visavis::{BLOCK_FRAMES, Engine, Error, ErrorKind, FPS, Result, Root, SAMPLE_RATE, Sampler, Session};
+use visavis::{BLOCK_FRAMES, Engine, Error, ErrorKind, FPS, Result, Root, SAMPLE_RATE, Sampler, Session, Speaker};
 
 /// What agent and user say, 24 kHz mono, repeated without end.
 #[derive(Debug, Clone, PartialEq)]
@@ -97,7 +97,7 @@ impl<'a> Script<'a> {
             session.set_gaze(GAZES[part as usize % GAZES.len()])?;
             let cheap = self.student && (14..16).contains(&part);
             session.set_sampler(if cheap { Sampler::Single } else { self.sampler })?;
-            session.user_voice().set_present(part != 9);
+            session.voice_input(Speaker::User).set_present(part != 9);
         }
         let quiet = part == 6 || part == 17;
         let seconds = BLOCK_FRAMES as f64 / f64::from(FPS);
@@ -131,7 +131,8 @@ impl<'a> Script<'a> {
         }
     }
 
-    /// The user's head, 120 times a second: around the agent, nearer and further, standing, gone, elsewhere at once.
+    /// The user's head, 120 times per second: around the agent, nearer and further, standing, gone,
+    /// elsewhere at once.
     fn walk(&mut self, session: &mut Session, at: f64, part: u64) -> Result<()> {
         let now = session.next_due();
         if part == 3 || part == 12 {

@@ -11,8 +11,9 @@ const STAY: u64 = 6;
 /// Switches of a soak.
 pub(super) const SWITCHES: u64 = 120;
 
-/// Seam metric at `switches` switches of a session that goes up and down a governor's ladder, a step every 0.8 s, in a conversation;
-/// `None` where nothing moves. Slots are up to date when they are climbed to, as the governor sees to it: it changes time, not motion.
+/// Seam metric at `switches` switches of a session that goes up and down a governor's ladder, a
+/// step every 0.8 s, in a conversation; `None` where nothing moves. Slots are up to date when they
+/// are climbed to, as the governor sees to it: it changes time, not motion.
 ///
 /// # Errors
 /// Those of a session.

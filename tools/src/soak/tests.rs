@@ -11,8 +11,9 @@ fn voices() -> Voices {
     Voices::new(voice(0.05), voice(0.08)).unwrap()
 }
 
-/// Nine minutes of the tiny model: everything is driven and everything is measured. Its weights are random, so its motion and
-/// what the guard makes of it say nothing; that drift is judged as it should be is tested apart.
+/// Nine minutes of the tiny model: everything is driven and everything is measured. Its weights are
+/// random, so its motion and what the guard makes of it say nothing; that drift is judged as it
+/// should be is tested apart.
 #[test]
 fn a_short_soak_measures_everything() {
     let soak = Soak { hours: 0.15, from_hour: 24.0, seed: 3, sampler: Sampler::Midpoint2 };
@@ -30,7 +31,8 @@ fn a_short_soak_measures_everything() {
     assert!(serde_json::to_string(&report).unwrap().contains("\"verdicts\""));
 }
 
-/// The model that is shipped, on the sample conversation, up and down the ladder: 40 switches, the same on every computer.
+/// The model that is shipped, on the sample conversation, up and down the ladder: 40 switches, the
+/// same on every computer.
 #[test]
 fn the_shipped_model_hides_its_switches() {
     let file = |name: &str| format!("{}/../{name}", env!("CARGO_MANIFEST_DIR"));

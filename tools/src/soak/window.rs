@@ -1,4 +1,5 @@
-//! Metrics over many minutes of frames, in constant memory: measured over half minutes, and averaged.
+//! Metrics over many minutes of frames, in constant memory: measured over half minutes, and
+//! averaged.
 
 use crate::metrics::{Summary, foot_slide};
 use crate::recording::Recording;
@@ -43,7 +44,8 @@ impl Figures {
     }
 }
 
-/// Collects frames and measures them piece by piece. All memory that frames take is taken at the start.
+/// Collects frames and measures them piece by piece. All memory that frames take is taken at the
+/// start.
 pub(super) struct Window {
     recording: Recording,
     /// Frames that wait for their turn.

@@ -34,8 +34,9 @@ impl TraceInput {
     /// Reads the inputs for `engine` from a safetensors file.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`] when it cannot be read; [`ErrorKind::Argument`], naming file and tensor, when it is not
-    /// safetensors, a tensor has another shape or type than the table says or is not finite, or no block would be run.
+    /// [`ErrorKind::Io`] when it cannot be read; [`ErrorKind::Argument`], naming file and tensor,
+    /// when it is not safetensors, a tensor has another shape or type than the table says or is not
+    /// finite, or no block would be run.
     pub fn read(path: impl AsRef<Path>, engine: &Engine) -> Result<Self> {
         let path = path.as_ref();
         let bytes = visavis::internals::bounded::read(path, MAX_BYTES)
@@ -79,7 +80,8 @@ impl TraceInput {
     }
 }
 
-/// The values of a tensor of the given shape (`None`: any length), or `None` where there is no such tensor.
+/// The values of a tensor of the given shape (`None`: any length), or `None` where there is no such
+/// tensor.
 fn values(file: &SafeTensors<'_>, name: &str, shape: &[Option<usize>]) -> Result<Option<Vec<f32>>> {
     let Ok(view) = file.tensor(name) else { return Ok(None) };
     let fits = view.shape().len() == shape.len()

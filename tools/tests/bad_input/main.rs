@@ -1,4 +1,5 @@
-//! Bad input of every kind: a typed error that names the file and what is wrong, and nothing half-written.
+//! Bad input of every kind: a typed error that names the file and what is wrong, and nothing
+//! half-written.
 
 #[path = "../common/cli.rs"]
 mod cli;

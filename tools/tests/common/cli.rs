@@ -65,7 +65,8 @@ pub fn tone(rate: u32, seconds: f32) -> Vec<u8> {
     wav(rate, &samples)
 }
 
-/// The program; on an emulated architecture behind the runner that Cargo uses for the tests themselves.
+/// The program; on an emulated architecture behind the runner that Cargo uses for the tests
+/// themselves.
 pub fn command() -> Command {
     let program = env!("CARGO_BIN_EXE_visavis");
     let runner = match std::env::var("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER") {
@@ -91,7 +92,8 @@ pub fn succeeds<S: AsRef<std::ffi::OsStr>>(args: &[S]) -> String {
     String::from_utf8(output.stdout).expect("UTF-8")
 }
 
-/// Standard error of a run that must fail with exit code `code`: `visavis: ...`, and nothing on standard output.
+/// Standard error of a run that must fail with exit code `code`: `visavis: ...`, and nothing on
+/// standard output.
 pub fn fails<S: AsRef<std::ffi::OsStr>>(code: i32, args: &[S]) -> String {
     let output = visavis(args);
     let stderr = String::from_utf8(output.stderr).expect("UTF-8");

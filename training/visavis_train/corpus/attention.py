@@ -8,7 +8,7 @@ from sustained contact to avoidance, so that SARAH's gaze score covers about 0..
 import numpy as np
 
 from ..motion import rig
-from .signals import FPS, delay, follow, gaussian, keyed, minjerk, smooth_noise
+from .signals import FPS, delay, follow, gaussian, keyed, minjerk
 
 
 def draw_level(rng, r=None):
@@ -90,21 +90,33 @@ def offsets(rng, level, speaking):
     return slow + fast, body
 
 
-def nods(rng, frames, phrase_ends, speaking, gain=1.0):
-    """Pitch [T] (rad, down positive) of nods after the other's phrase ends: damped cycles at 1.8-3 Hz, 4-11 degrees."""
+def nods(rng, frames, phrases, speaking):
+    """Pitch [T] (rad, down positive) of a listener's nods: damped cycles at 1.6-2.6 Hz, 3-10 degrees.
+
+    They answer the ends of the other's phrases (Dittmann & Llewellyn 1968), about 0.3 s after them with a spread of
+    0.3 s, and now and then fall within long phrases, at least 2 s after their start; six to ten a minute of the other's
+    speech for most listeners (Hadar et al. 1985; Poppe et al. 2010)."""
     out = np.zeros(frames)
-    rate = rng.uniform(0.35, 0.85)
-    for end in phrase_ends:
-        at = int((end + rng.uniform(-0.1, 0.45)) * FPS)
-        if at >= frames or at < 0 or speaking[min(at, frames - 1)] or rng.random() > rate:
+    rate = rng.uniform(0.30, 0.80)
+    inside = rng.uniform(1.0, 5.0) / 60                  # a second of a long phrase
+    free = 0
+    wishes = []
+    for a, b in phrases:
+        if rng.random() < rate:
+            wishes.append((b + float(np.clip(rng.normal(0.3, 0.3), -0.2, 1.1)), 1.0))
+        for _ in range(rng.poisson(inside * max(b - a - 2.5, 0))):
+            wishes.append((rng.uniform(a + 2.0, b - 0.5), 0.7))
+    for t, size in sorted(wishes):
+        at = int(t * FPS)
+        if not free <= at < frames or speaking[at]:
             continue
-        f, cycles = rng.uniform(1.6, 2.6), rng.choice([1, 2, 2, 3])
+        f, cycles = rng.uniform(1.6, 2.6), rng.choice([1, 1, 2, 2, 3])
         n = int(FPS * cycles / f)
         x = np.arange(n) / n
-        amp = gain * rng.uniform(0.06, 0.17)
-        wave = amp * 0.5 * (1 - np.cos(2 * np.pi * cycles * x)) * (1 - 0.55 * x)
+        wave = size * rng.uniform(0.06, 0.17) * 0.5 * (1 - np.cos(2 * np.pi * cycles * x)) * (1 - 0.55 * x)
         e = min(frames, at + n)
         out[at:e] += wave[: e - at]
+        free = at + n + FPS
     return gaussian(out, 1.0)
 
 
@@ -120,10 +132,11 @@ def head_beats(rng, frames, peaks, strength):
     return out
 
 
-def head_angles(rng, head_pos, user, offset, chest_yaw0, root_yaw):
+def head_angles(rng, head_pos, user, offset, root_yaw, own):
     """World yaw [T] (continuous), pitch [T] and roll [T] wanted of the head.
 
-    head_pos [T, 3]: approximate head position; user [T, 3]: seen with a reaction delay of 0.17-0.3 s."""
+    head_pos [T, 3]: approximate head position; user [T, 3]: seen with a reaction delay of 0.17-0.3 s; own [T, 3]: what a real
+    person's head adds (yaw, pitch, roll)."""
     frames = len(user)
     lag = int(rng.integers(5, 9))
     d = delay(user, lag) - head_pos
@@ -136,10 +149,7 @@ def head_angles(rng, head_pos, user, offset, chest_yaw0, root_yaw):
     target = base + rel
     yaw_out = follow(target, rng.uniform(9, 13), 6.5, 75.0)
     pitch_out = follow(pitch, rng.uniform(8, 11), 4.0, 50.0)
-    roll = smooth_noise(rng, frames, 3.0, 0.02) + _tilts(rng, frames)
-    yaw_out = yaw_out + smooth_noise(rng, frames, 1.1, 0.012)
-    pitch_out = pitch_out + smooth_noise(rng, frames, 1.3, 0.012)
-    return yaw_out, pitch_out, roll
+    return yaw_out + own[:, 0], pitch_out + own[:, 1], _tilts(rng, frames) + own[:, 2]
 
 
 def _tilts(rng, frames):

@@ -7,7 +7,7 @@ from multiprocessing import get_context
 import numpy as np
 
 from ..motion import bvh
-from . import gestures, plausible, real, simulate, store, voices
+from . import converse, gestures, plausible, real, rest, simulate, store, voices
 
 SPLITS = ("train", "val", "test")
 RETRIES = 8
@@ -19,7 +19,7 @@ def load_sources(data, split):
     skeleton = bvh.read_bvh(os.path.join(data, "motion", "cmu_walk", "02_01.bvh")).skeleton
     spots, motifs = gestures.real_shapes(real.signal_takes(data, split, skeleton))
     return simulate.Sources(voices.load_voices(speech, split), voices.load_pair(speech) if split == "test" else None,
-                            real.head_paths(data, split), spots, motifs)
+                            real.head_paths(data, split), spots, motifs, rest.load(data, split), converse.load(data, split), real.swing_library(data, split))
 
 
 def split_hours(hours):
@@ -37,11 +37,11 @@ def clip_lengths(seed, s, hours):
     return out
 
 
-def talk(rng_key, frames, src, quantile):
-    """One plausible conversation and the number of draws thrown away before it: [(clip, rejected reasons)]."""
+def talk(rng_key, frames, src, *fixed):
+    """One plausible conversation and the reasons of the draws thrown away before it; `fixed` as for `simulate_clip`."""
     rejected = []
     for attempt in range(RETRIES):
-        clip = simulate.simulate_clip(np.random.default_rng([*rng_key, attempt]), frames, src, quantile)
+        clip = simulate.simulate_clip(np.random.default_rng([*rng_key, attempt]), frames, src, *fixed)
         reasons = plausible.faults(clip.positions, clip.rotations, plausible.SIMULATED)
         if not reasons:
             return clip, rejected
@@ -60,14 +60,22 @@ def _start(data, split):
 
 def _write_talk(job):
     folder, seed, s, i, frames = job
-    clip, rejected = talk((seed, s, 2, i), frames, _sources, (0.35 + i * 0.6180339887) % 1.0)  # golden ratio: levels spread evenly
+    # every eighth clip is silent; multiples of irrational numbers spread gaze levels and recordings at rest evenly
+    silent = i % 8 == 3
+    person = (0.5 + (i // 8 if silent else i) * 0.7548776662) % 1.0
+    clip, rejected = talk((seed, s, 2, i), frames, _sources, (0.35 + i * 0.6180339887) % 1.0, person, silent)
     store.save(os.path.join(folder, f"talk_{i:05d}.safetensors"), clip.positions, clip.rotations, clip.user, clip.agent_voice, clip.user_voice,
-               {"split": SPLITS[s], "sources": clip.sources, "gaze_level": f"{clip.level.mean():.4f}", "seed": f"{seed}/{s}/{i}", "kind": "talk"})
+               {"split": SPLITS[s], "sources": clip.sources, "gaze_level": f"{clip.level.mean():.4f}", "seed": f"{seed}/{s}/{i}", "kind": "talk",
+                "agent_phrases": _seconds(clip.agent_phrases), "user_phrases": _seconds(clip.user_phrases), "joins": clip.joins})
     return rejected
 
 
+def _seconds(phrases):
+    return [[round(float(a), 3), round(float(b), 3)] for a, b in phrases]
+
+
 def _real_clips(data, folder, split, seed, s):
-    """Writes the two-person takes and the chained walks; returns the reasons of what was left out."""
+    """Writes the two-person takes, the chained walks and the people at rest; returns the reasons of what was left out."""
     left_out = []
     for name, p, r, u in real.two_person(data, split):
         meta = {"split": split, "sources": ["cmu_two_person/" + name], "gaze_level": "nan", "seed": str(seed), "kind": "pair"}
@@ -75,6 +83,9 @@ def _real_clips(data, folder, split, seed, s):
     for name, p, r, u, parts in real.walks(data, split, np.random.default_rng([seed, s, 1])):
         meta = {"split": split, "sources": parts, "gaze_level": "nan", "seed": str(seed), "kind": "walk"}
         left_out += _keep(os.path.join(folder, f"walk_{name}.safetensors"), p, r, u, meta)
+    for name, p, r, u in real.idles(data, split, np.random.default_rng([seed, s, 4])):
+        meta = {"split": split, "sources": [name], "gaze_level": "nan", "seed": str(seed), "kind": "idle"}
+        left_out += _keep(os.path.join(folder, f"idle_{name}.safetensors"), p, r, u, meta)
     return left_out
 
 

@@ -4,7 +4,7 @@ import sys
 import numpy as np
 
 from ..motion import rig
-from . import store, voices
+from . import people, store, voices
 
 FEET = [rig.INDEX["leftToes"], rig.INDEX["rightToes"]]
 WRISTS = [rig.INDEX["leftHand"], rig.INDEX["rightHand"]]
@@ -71,10 +71,12 @@ def report(folder, splits=("train", "val", "test")):
     """Text table of a corpus, by split and kind of clip."""
     lines = []
     for split in splits:
-        kinds = {}
+        kinds, talks = {}, people.Conversations()
         for path in store.list_clips(folder, split):
             clip = store.load(path)
             kinds.setdefault(clip.meta.get("kind", "?"), []).append(clip_stats(clip))
+            if clip.meta.get("kind") == "talk":
+                talks.add(clip)
         for kind, rows in sorted(kinds.items()):
             cat = {k: np.concatenate([r[k] for r in rows]) for k in rows[0]}
             sp, sp1 = cat["speaking"], np.concatenate([r["speaking"][1:] for r in rows])
@@ -92,7 +94,7 @@ def report(folder, splits=("train", "val", "test")):
                 f"{np.percentile(cat['accel'], 99.9):.0f} max {cat['accel'].max():.0f} m/s2",
                 f"  arm in trunk {(cat['trunk'] > 0.02).mean():.4f} of frames, deepest {cat['trunk'].max():.3f} m; user distance p5/50/95 "
                 f"{np.percentile(cat['dist'], [5, 50, 95]).round(2).tolist()}; bones off by {cat['bone'].max():.1e} m",
-            ]
+            ] + (people.talk_lines(talks.row()) if kind == "talk" else [])
     return "\n".join(lines)
 
 

@@ -92,11 +92,12 @@ def _segment(rng, kind, user, agent, height, real_paths):
 _KINDS = ["stand", "approach", "leave", "pace", "walk", "circle", "crouch", "jump", "real"]
 
 
-def simulate(rng, frames, bias, mobility, real_paths=()):
+def simulate(rng, frames, bias, mobility, real_paths=(), restless=(6, 20)):
     """Runs user and agent together.
 
-    `bias` [T]: wanted body heading away from the user's direction [rad]; `mobility` 0..1: how much the user moves about;
-    `real_paths`: head paths [n, 3] of real people of the same split. Returns an Encounter.
+    `bias` [T]: wanted body heading away from the user's direction [rad]; `mobility` -0.15..1: how much the user moves about;
+    `real_paths`: head paths [n, 3] of real people of the same split; `restless`: seconds from one step of its own accord
+    to the next. Returns an Encounter.
     """
     dt = 1.0 / FPS
     weights = np.array([1.0, 0.7, 0.9, 0.7, 0.5, 0.6, 0.25, 0.4, 0.35])
@@ -114,7 +115,7 @@ def simulate(rng, frames, bias, mobility, real_paths=()):
     threshold, hold = rng.uniform(0.25, 0.6), 0
     slack = rng.uniform(0.3, 0.55)
     brisk = rng.uniform(0.8, 1.3)
-    fidget, shift_pos, shift_yaw = int(FPS * rng.uniform(5, 15)), np.zeros(2), 0.0
+    fidget, shift_pos, shift_yaw = int(FPS * rng.uniform(*restless)), np.zeros(2), 0.0
     U, H, P, Y, V, events = [], [], [], [], [], []
     while len(U) < frames:
         kind = _KINDS[rng.choice(len(_KINDS), p=weights)] if U else "stand"
@@ -132,7 +133,7 @@ def simulate(rng, frames, bias, mobility, real_paths=()):
             dist = max(np.hypot(*d), 1e-3)
             fidget -= 1
             if fidget <= 0:                            # a restless step or re-orientation now and then
-                fidget = int(FPS * rng.uniform(6, 20))
+                fidget = int(FPS * rng.uniform(*restless))
                 shift_yaw = rng.normal(0, 0.12)
                 shift_pos = rng.normal(0, 0.07, 2)
                 turning = turning or rng.random() < 0.5

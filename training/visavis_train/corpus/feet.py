@@ -10,6 +10,7 @@ import numpy as np
 from ..motion import rig
 from ..motion.rig import wrap
 from .signals import FPS, gaussian, minjerk
+from .swings import PITCHES
 
 HALF_WIDTH = 0.095          # lateral offset of a foot from the body's mid line [m]
 TOE = rig.OFFSETS[rig.INDEX["leftToes"]]  # ankle -> toes at rest
@@ -41,11 +42,11 @@ def _spot(root, yaw, foot, toe_out, spread):
     return root + side + ahead, fy
 
 
-def plan(rng, root, yaw, height=None):
-    """Footsteps for a root path: root [T, 2], yaw [T] -> Feet."""
+def plan(rng, root, yaw, library=None):
+    """Footsteps for a root path: root [T, 2], yaw [T] -> Feet. `library`: real swings (swings.Swings), else smooth curves."""
     t_end = len(root)
     toe_out, spread = rng.uniform(0.06, 0.22), rng.uniform(0.95, 1.35)
-    lift = rng.uniform(0.05, 0.08) if height is None else height
+    lift = rng.uniform(0.05, 0.08)
     vel = gaussian(np.gradient(root, axis=0) * FPS, 3)
     speed = np.hypot(vel[:, 0], vel[:, 1])
     rate = np.abs(gaussian(np.gradient(np.unwrap(yaw)) * FPS, 3))
@@ -54,7 +55,7 @@ def plan(rng, root, yaw, height=None):
         pos[f], fyaw[f] = _spot(root[0], yaw[0], f, toe_out, spread)
     toe = np.zeros((t_end, 2, 3))
     oy, swing = np.zeros((t_end, 2)), np.zeros((t_end, 2))
-    steps, busy, last, last_end, uneasy = [], None, 1, -30, 0
+    steps, likes, like, busy, last, last_end, uneasy = [], [], None, None, 1, -30, 0
     for t in range(t_end):
         if busy is None:
             errs = []
@@ -84,6 +85,9 @@ def plan(rng, root, yaw, height=None):
                 gy = fyaw[1 - f] + np.clip(wrap(gy - fyaw[1 - f]), -1.05, 1.05)
                 goal = _keep_clear(goal, pos[1 - f], fyaw[1 - f], f)
                 busy = (f, t, t + dur, pos[f].copy(), fyaw[f], goal, fyaw[f] + wrap(gy - fyaw[f]))
+                if library is not None:
+                    like = _like(rng, library, busy)
+                    curve = library.curves(like, np.arange(dur) / dur)
                 uneasy = 0
         for f in (0, 1):
             toe[t, f, [0, 2]] = pos[f]
@@ -92,19 +96,26 @@ def plan(rng, root, yaw, height=None):
             f, a, b, p0, y0, p1, y1 = busy
             u = (t - a) / (b - a)
             c = np.clip((u - 0.05) / 0.9, 0, 1)
-            s = 0.5 * (minjerk(c) + c * c * (3 - 2 * c))
-            path = p0 + (p1 - p0) * s
+            s = turned = 0.5 * (minjerk(c) + c * c * (3 - 2 * c))
+            aside = 0.0
+            if like is not None:
+                s, aside, _, turned = curve[t - a]
+            left = np.array([np.cos(y1), -np.sin(y1)]) * (1 if f == 0 else -1)
             out = _bulge(p0, p1, pos[1 - f])
-            toe[t, f, [0, 2]] = path + out * np.sin(np.pi * s)
-            oy[t, f] = y0 + (y1 - y0) * s
+            toe[t, f, [0, 2]] = p0 + (p1 - p0) * s + out * np.sin(np.pi * s) + left * max(aside, -0.01)
+            oy[t, f] = y0 + (y1 - y0) * turned
             swing[t, f] = max(u, 1e-3)
             if t + 1 >= b:
                 pos[f], fyaw[f] = p1, y1
                 steps.append((f, a, b, float(np.hypot(*(p1 - p0))), float((p1 - p0) @ [np.sin(y1), np.cos(y1)])))
+                likes.append(like)
                 last, last_end, busy = f, t, None
     pitch = np.zeros((t_end, 2))
     toe[..., 1] = rig.TOE_HEIGHT
-    for f, a, b, length, ahead in steps:
+    for (f, a, b, length, ahead), like in zip(steps, likes):
+        if like is not None:
+            _lift(library, like, toe[:, f, 1], pitch[:, f], a, b, length)
+            continue
         k = np.clip(ahead / 0.6, -0.35, 1.0)
         n = b - a
         u = np.arange(n) / n
@@ -123,6 +134,28 @@ def plan(rng, root, yaw, height=None):
     load[swing[:, 0] > 0] = 0.0
     load[swing[:, 1] > 0] = 1.0
     return Feet(toe, oy, pitch, swing, load, steps)
+
+
+def _like(rng, library, step):
+    """Index of a real swing that goes about as far, turns about as much and takes about as long as a step."""
+    f, a, b, p0, y0, p1, y1 = step
+    out = 1 if f == 0 else -1
+    fwd, left = np.array([np.sin(y1), np.cos(y1)]), np.array([np.cos(y1), -np.sin(y1)])
+    return library.nearest(rng, np.array([(p1 - p0) @ fwd, (p1 - p0) @ left * out, (y1 - y0) * out, (b - a) / FPS]))
+
+
+def _lift(library, like, height, pitch, a, b, length):
+    """Writes height above the floor and pitch of a real swing into one foot's tracks [T], frames a..b and around."""
+    n, t_end = b - a, len(height)
+    real = np.hypot(*library.what[like, :2])
+    gain = np.clip(np.sqrt((length + 0.05) / (real + 0.05)), 0.5, 1.3)         # a shorter step is a lower one
+    height[a:b] += gain * np.maximum(library.curves(like, np.arange(n) / n)[:, 2], 0)
+    lo, hi = max(0, int(np.ceil(a + PITCHES[0] * n))), min(t_end, int(a + PITCHES[-1] * n))
+    u = (np.arange(lo, hi) - a) / n
+    tilt = gain * library.tilt(like, u)
+    tilt = np.where(tilt < 0, tilt * minjerk((1 - u) / 0.25), tilt)                # a lifted toe is down by the landing
+    on = (np.arange(lo, hi) < a) | (np.arange(lo, hi) >= b)
+    pitch[lo:hi] += np.where(on, np.maximum(tilt, 0), np.clip(tilt, -0.3, 0.9))   # the toe stays down while the foot stands
 
 
 def _keep_clear(goal, other, other_yaw, foot):

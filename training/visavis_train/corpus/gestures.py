@@ -1,4 +1,4 @@
-"""Wrist paths of the arms: rest poses, beat gestures in phases, shapes parametric and from the real arm-signal takes.
+"""Wrist paths of the arms: beat gestures in phases above the rest layer, shapes parametric and from the real arm-signal takes.
 
 Phases preparation, stroke, hold, retraction (Kendon 1980; McNeill 1992); strokes fall on or just before stressed
 syllables (Loehr 2012); amplitude follows loudness. Positions are relative to the shoulder (upper-arm joint), in the
@@ -9,27 +9,30 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..motion import rig
+from .rest import TWIST
 from .signals import FPS, gaussian, keyed, minjerk, smooth_noise
 
-# name: (wrist relative to the shoulder [m], elbow swivel outwards [rad], palm twist [rad], both hands?)
-RESTS = {
-    "hang": ((0.07, -0.490, 0.06), 0.25, 0.15, False),
-    "hang_wide": ((0.12, -0.475, 0.08), 0.40, 0.3, False),
-    "clasp": ((-0.135, -0.350, 0.235), 0.75, 0.1, True),
-    "belly": ((-0.09, -0.270, 0.265), 0.80, 0.25, True),
-    "hip": ((0.045, -0.375, 0.06), 1.15, 0.5, False),
-}
 SWIVEL_GESTURE = 0.5
 
 
 @dataclass
 class Arms:
-    """Per side (0 left, 1 right): wrist [2, T, 3] in the mirrored shoulder frame, elbow swivel [2, T], twist [2, T]; the
-    gesture mask [2, T]."""
+    """Per side (0 left, 1 right), T frames, in the mirrored shoulder frame: wrist [2, T, 3], unit direction of the elbow
+    from the arm's line [2, T, 3], palm twist [2, T], share of the gesture above the rest pose 0..1 [2, T]."""
     wrist: np.ndarray
-    swivel: np.ndarray
+    elbow: np.ndarray
     twist: np.ndarray
     active: np.ndarray
+
+
+def elbow_of(wrist, swivel):
+    """Elbow directions [T, 3] of wrists [T, 3] by swivel angles [T]: behind a hanging arm, turned with the arm by the
+    shortest rotation, then outwards; clear of the trunk where the arm crosses the body."""
+    zero = np.zeros(len(wrist))
+    out = swivel + 0.7 * np.clip((0.05 - wrist[:, 0]) / 0.15, 0, 1)
+    back = np.stack([np.sin(out), zero, -np.cos(out)], 1)
+    down = np.stack([zero, zero - 1, zero], 1)
+    return np.einsum("tab,tb->ta", rig.between(down, rig.unit(wrist)), back)
 
 
 def real_shapes(takes):
@@ -77,83 +80,64 @@ def limit(p):
     return p * np.minimum(1.0, 0.505 / np.maximum(r, 1e-6)) * np.maximum(1.0, 0.20 / np.maximum(r, 1e-6))
 
 
-def _rest_plan(rng, frames):
-    """Sequence of (start frame, pose name of left, of right)."""
-    style = rng.choice(["hang", "hang_wide", "clasp", "belly", "mixed"], p=[0.4, 0.15, 0.15, 0.12, 0.18])
-    out, t = [], 0
-    while t < frames:
-        if style == "mixed" or rng.random() < 0.2:
-            name = rng.choice(list(RESTS), p=[0.4, 0.2, 0.15, 0.1, 0.15])
-        else:
-            name = style
-        pair = [name, name]
-        if name == "hip" and rng.random() < 0.6:
-            pair[rng.integers(2)] = "hang"
-        out.append((t, pair))
-        t += int(FPS * rng.uniform(8, 30))
-    return out
-
-
-def plan(rng, frames, peaks, strength, phrases, spots, motifs, liveliness, walk_speed):
-    """Arms for a clip. `peaks`, `strength`: prosodic peaks of the agent's voice; `liveliness` 0..1; walk_speed [T]."""
-    wrist, swivel, twist = np.zeros((2, frames, 3)), np.zeros((2, frames)), np.zeros((2, frames))
-    active = np.zeros((2, frames))
-    rests = _rest_plan(rng, frames)
-    jitter = {n: [rng.normal(0, 0.012, 3) for _ in range(2)] for n in RESTS}
-    units = _units(rng, peaks, strength, liveliness, spots, motifs)
+def plan(rng, frames, peaks, strength, phrases, spots, motifs, liveliness, rest, busy):
+    """Arms for a clip. `peaks`, `strength`: prosodic peaks of the agent's voice; `liveliness` 0..1; `rest`: the layers
+    (corpus.rest.Rest) that strokes leave from, come back to and that show wherever there is no gesture; `busy` [T] bool: where they hold a gesture already."""
+    wrist, elbow = rest.wrist.swapaxes(0, 1).copy(), rest.elbow.swapaxes(0, 1).copy()
+    twist, active = np.full((2, frames), TWIST), np.zeros((2, frames))
+    units = [u for u in _units(rng, peaks, strength, liveliness, spots, motifs)
+             if not busy[max(0, u["strokes"][0][0] - FPS): u["strokes"][-1][0] + 2 * FPS].any()]
     for side in (0, 1):
+        shares, holds = [0], [0.0]
         times, w, po, tw = [], [], [], []
+        mot = np.zeros((frames, 3))
 
         def key(t, pos, pl, ang):
             if times and t - times[-1] < 4:            # closer keys would jerk
                 return
             times.append(t), w.append(np.asarray(pos, float)), po.append(float(pl)), tw.append(float(ang))
 
-        def rest_at(t):
-            name = [p for s, p in rests if s <= max(t, 0)][-1][side]
-            pos, pl, ang, _ = RESTS[name]
-            return np.array(pos) + jitter[name][side], pl, ang
-
-        changes = [s for s, _ in rests][1:]
-        key(0, *rest_at(0))
-        mot = np.zeros((frames, 3))
         for unit in units:
             if side not in unit["hands"]:
                 continue
             first = unit["strokes"][0][0]
-            prep = first - int(FPS * 0.2) - int(FPS * rng.uniform(0.35, 0.6))
-            if prep <= times[-1] + 3:
-                prep = times[-1] + 1
+            lead = int(FPS * rng.uniform(0.35, 0.6))
+            prep = first - int(FPS * 0.2) - lead
+            if prep <= shares[-1] + 3:
+                prep = shares[-1] + 1
                 if first - int(FPS * 0.2) - prep < 6:
                     continue
-            for c in [c for c in changes if times[-1] < c < prep - 30]:
-                key(c, *rest_at(c - 1)), key(c + int(FPS * 0.9), *rest_at(c + 1))
-            if times[-1] < prep:
-                key(prep, w[-1], po[-1], tw[-1])
             plan_ = unit["plans"][0 if unit["sym"] else side]
+            arrive = None
             for (t, s), (spot, raise_, ang, pl, before, after, motif) in zip(unit["strokes"], plan_):
                 spot = limit(spot + rng.normal(0, 0.008, 3))
                 key(t - before, limit(spot + raise_), pl, ang - 0.15)
+                arrive = t - before if arrive is None else arrive
                 key(t + 1, spot, pl, ang + 0.15)
                 key(t + 1 + after, limit(spot + 0.18 * raise_), pl, ang)
                 if motif is not None:
                     a, b = max(0, t - 15), min(frames, t + 21)
                     mot[a:b] += motif[a - (t - 15): 36 - (t + 21 - b)]
-            end = times[-1] + int(FPS * rng.uniform(0.1, 0.7))
-            key(end, w[-1] + rng.normal(0, 0.008, 3), po[-1], tw[-1])
-            back = end + int(FPS * rng.uniform(0.55, 0.95))
-            key(back, *rest_at(back))
-            active[side, max(0, prep): min(frames, back)] = 1
-        for c in [c for c in changes if c > times[-1]]:
-            key(c, *rest_at(c - 1)), key(c + int(FPS * 0.9), *rest_at(c + 1))
+            end = max(times[-1] + int(FPS * rng.uniform(0.1, 0.7)), arrive + 6)
+            far = np.linalg.norm(w[-1] - wrist[side, min(end, frames - 1)])
+            back = end + int(FPS * (rng.uniform(0.55, 0.95) + 0.5 * max(far - 0.3, 0)))
+            arrive = max(arrive, prep + 6)
+            shares += [prep, arrive, end, back]
+            holds += [0.0, 1.0, 1.0, 0.0]
+        if not times:
+            continue
+        share = keyed(frames, shares, np.array(holds))
         p = keyed(frames, times, np.array(w)) + mot
-        a = gaussian(active[side], 6)
-        live = 0.004 + 0.010 * a                     # small drift, more in gesture than at rest
-        p += np.stack([smooth_noise(rng, frames, pr, 1.0) * live for pr in (0.9, 0.8, 1.0)], 1)
-        wrist[side] = gaussian(limit(p), 1.0)
-        swivel[side] = gaussian(keyed(frames, times, np.array(po)), 1.5)
-        twist[side] = gaussian(keyed(frames, times, np.array(tw)), 1.5) + smooth_noise(rng, frames, 1.2, 0.03)
-    return Arms(wrist, swivel, twist, active)
+        # a hand held up trembles like the resting one of the same person, a little more
+        p += 1.5 * (rest.wrist[:, side] - gaussian(rest.wrist[:, side], 8.0))
+        p = gaussian(limit(p), 1.0)
+        turn = elbow_of(p, gaussian(keyed(frames, times, np.array(po)), 1.5))
+        k = gaussian(share, 1.0)[:, None]
+        wrist[side] = wrist[side] * (1 - k) + p * k
+        elbow[side] = rig.unit(elbow[side] * (1 - k) + turn * k)
+        twist[side] = TWIST + k[:, 0] * (gaussian(keyed(frames, times, np.array(tw)), 1.5) - TWIST + smooth_noise(rng, frames, 1.2, 0.03))
+        active[side] = share
+    return Arms(wrist, elbow, twist, active)
 
 
 def _stroke_plan(rng, strokes, size, spots, motifs):

@@ -1,4 +1,4 @@
-"""Real takes as clips of their own: the two-person dances (both roles, mirrored) and the walks."""
+"""Real takes as clips of their own: the two-person dances (both roles, mirrored), the walks and people at rest."""
 import os
 
 import numpy as np
@@ -6,6 +6,7 @@ import numpy as np
 from ..motion import rig
 from ..motion.contacts import lock_feet
 from ..motion.retarget import load_take
+from . import rest, swings
 from .signals import FPS, gaussian, minjerk, smooth_noise
 
 # Takes by split; a take, and for walks and speech a person, is in one split only.
@@ -70,6 +71,50 @@ def head_paths(data, split):
     return [u for name, _, _, u in two_person(data, split, 4.0)]
 
 
+# Walks, turns, side steps and stops of one actress: train only
+ACCAD_WALKS = ("B01_StandToWalk", "B02_WalkToStand", "B02_WalkToStandT2", "B03_Walk1", "B04_StandToWalkBack", "B05_WalkBackwards",
+               "B06_WalkBackwardsToStand", "B07_WalkBackwardsTurnForwards", "B08_WalkBackwardsStopForwards", "B09_WalkTurnLeft90",
+               "B10_WalkTurnLeft45", "B11_WalkTurnLeft135", "B12_WalkTurnRight90", "B13_WalkTurnRight45", "B14_WalkTurnRight135",
+               "B15_WalkTurnAround180", "B16_WalkTurnChangeDirection", "B22_SideStepLeft", "B23_SideStepRight")
+
+
+def accad_walks(data, split):
+    """Good stretches of the actress's walks: [(name, positions, rotations)]."""
+    if split != "train":
+        return []
+    out = []
+    for name in ACCAD_WALKS:
+        name = "accad_female1/Female1_" + name
+        t = rest.take(data, name)
+        out += [(f"{name}_{a}", t.positions[a:b], t.rotations[a:b]) for a, b in _pieces(capture_errors(t.positions), 45)]
+    return out
+
+
+def swing_library(data, split):
+    """Swings of the walks of a split, mirrored ones too (an outward step of the left foot is one of the right)."""
+    takes = [(p, r) for _, p, r in walk_takes(data, split) + accad_walks(data, split)]
+    return swings.gather(takes)
+
+
+def idles(data, split, rng):
+    """Yields (name, positions, rotations, user): people at rest as clips of their own, mirrored too; someone stands before
+    them, where they look most of the time or up to 0.6 rad aside of it."""
+    names = list(rest.TAKES[split]) + (["accad_female1/Female1_D1_Urban", "accad_female1/Female1_D2_Wait"] if split == "train" else [])
+    for name in names:
+        t = rest.take(data, name)
+        for a, b in _pieces(capture_errors(t.positions), 6 * FPS):
+            p, r = rest.dressed(*lock_feet(t.positions[a:b], t.rotations[a:b]))
+            for tag, (p, r) in (("", (p, r)), ("_mirror", rig.mirror(p, r))):
+                n = len(p)
+                look = np.median(np.unwrap(rig.yaw_of(r[:, rig.INDEX["head"]]))) + rng.uniform(-0.6, 0.6)
+                away = rng.uniform(1.2, 2.4)
+                u = np.tile(np.median(p[:, 0], 0) + away * np.array([np.sin(look), 0, np.cos(look)]), (n, 1))
+                u[:, 1] = rng.uniform(1.45, 1.80)
+                for c, amp in ((0, 0.012), (1, 0.004), (2, 0.012)):
+                    u[:, c] += smooth_noise(rng, n, 1.3, amp) + smooth_noise(rng, n, 4.0, amp)
+                yield f"{name.replace('/', '_')}_{a}{tag}", p, r, u
+
+
 def walk_takes(data, split):
     """Good stretches of the walks of a split: [(name, positions, rotations)], mirrored ones too."""
     folder = os.path.join(data, "motion", "cmu_walk")
@@ -116,7 +161,7 @@ def chain(parts, blend=12):
 
 def walks(data, split, rng, seconds=30.0):
     """Yields (name, positions, rotations, user, sources): chained walks of about `seconds`; the user goes ahead of the walker."""
-    takes = walk_takes(data, split)
+    takes = walk_takes(data, split) + accad_walks(data, split)
     order = rng.permutation(len(takes)).tolist()
     while order:
         parts = []
@@ -131,4 +176,4 @@ def walks(data, split, rng, seconds=30.0):
         gap = rng.uniform(1.2, 2.2) + smooth_noise(rng, n, 5, 0.25)
         u = path * [1, 0, 1] + rig.unit(fwd) * gap[:, None] + side * smooth_noise(rng, n, 4, 0.25)[:, None]
         u[:, 1] = rng.uniform(1.45, 1.8) + smooth_noise(rng, n, 0.4, 0.008)
-        yield parts[0][0], p, r, u, ["cmu_walk/" + name for name, _, _ in parts]
+        yield parts[0][0].replace("/", "_"), p, r, u, [name if "/" in name else "cmu_walk/" + name for name, _, _ in parts]

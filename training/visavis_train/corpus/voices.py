@@ -7,8 +7,9 @@ import os
 from dataclasses import dataclass
 
 import numpy as np
-import soundfile
 from scipy.signal import butter, fftconvolve, lfilter, resample_poly
+
+from .. import wav
 
 RATE = 24000
 HOP = 800
@@ -63,9 +64,7 @@ def vad(audio, hop=240, min_gap=0.25, min_len=0.3):
 
 def read(path):
     """A wav file as 24 kHz mono float32, its loud parts at one level."""
-    audio, sr = soundfile.read(path, dtype="float32")
-    if audio.ndim > 1:
-        audio = audio.mean(1)
+    audio, sr = wav.read(path)
     g = np.gcd(int(sr), RATE)
     audio = resample_poly(audio, RATE // g, sr // g).astype(np.float32) if sr != RATE else audio
     loud = np.percentile(envelope(audio, 240), 90)
@@ -208,7 +207,7 @@ def compose(rng, voices, frames, talk_share=0.5):
                 break
             t += min(0.15 + rng.gamma(2.0, 0.16), 1.0)
         r = rng.random()
-        t += rng.uniform(1.5, 4.5) if r < 0.1 else np.clip(rng.normal(0.2, 0.25), -0.45, 1.2)
+        t += rng.uniform(8.0, 30.0) if r < 0.04 else rng.uniform(1.5, 4.5) if r < 0.12 else np.clip(rng.normal(0.2, 0.25), -0.45, 1.2)
         k = 1 - k
     for p in phrases:
         p.sort()

@@ -1,15 +1,17 @@
-"""Motion files of the four CMU skeletons -> the 22-joint rig at 30 fps.
+"""Motion files of the CMU, FreeMoCap, ACCAD and Biped skeletons -> the 22-joint rig at 30 fps.
 
 Each target joint takes its source joint's global rotation relative to the source's rest pose, then an alignment
 A_j that maps the target's rest bone direction to the source's, so that a differing rest pose (splayed legs,
 drooping arms) does not turn limbs: R_tgt = R_src(t) R_src(rest)^T A_j. Positions come from FK on the rig.
 """
+import os
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from . import rig
-from .bvh import read_bvh, read_expmap
+from .bvh import Clip, read_bvh, read_expmap
+from .npz import read_npz
 from .rig import INDEX, J, NAMES, OFFSETS
 
 CMU_UNIT = 0.05644  # metres per unit of the 31-joint files
@@ -43,7 +45,19 @@ MAPS = {
               "neck": "CC_Base_NeckTwist01", "head": "CC_Base_Head",
               **_arms_legs([_word("CC_Base_{u}_Clavicle"), _word("CC_Base_{u}_Upperarm"), _word("CC_Base_{u}_Forearm"), _word("CC_Base_{u}_Hand")],
                            [_word("CC_Base_{u}_Thigh"), _word("CC_Base_{u}_Calf"), _word("CC_Base_{u}_Foot"), _word("CC_Base_{u}_ToeBase")])},
+    "freemocap": {"hips": "pelvis", "spine": "spine", "chest": "spine.001", "upperChest": "spine.001", "neck": "neck", "head": "face",
+                  **_arms_legs([_word("shoulder.{u}"), _word("upper_arm.{u}"), _word("forearm.{u}"), _word("forearm.{u}_End")],
+                               [_word("thigh.{u}"), _word("shin.{u}"), _word("foot.{u}"), _word("foot.{u}_End")])},
+    "accad": {"hips": "Hips", "spine": "ToSpine", "chest": "Spine", "upperChest": "Spine1", "neck": "Neck", "head": "Head",
+              **_arms_legs([_word("{w}Shoulder"), _word("{w}Arm"), _word("{w}ForeArm"), _word("{w}Hand")],
+                           [_word("{w}UpLeg"), _word("{w}Leg"), _word("{w}Foot"), _word("{w}ToeBase")])},
+    "biped": {"hips": "Bip01 Pelvis", "spine": "Bip01 Spine", "chest": "Bip01 Spine1", "upperChest": "Bip01 Spine2", "neck": "Bip01 Neck",
+              "head": "Bip01 Head",
+              **_arms_legs([_word("Bip01 {u} Clavicle"), _word("Bip01 {u} UpperArm"), _word("Bip01 {u} Forearm"), _word("Bip01 {u} Hand")],
+                           [_word("Bip01 {u} Thigh"), _word("Bip01 {u} Calf"), _word("Bip01 {u} Foot"), _word("Bip01 {u} Toe0")])},
 }
+# A Biped's axes run along its bones, so its rest pose is no zero pose: it is this frame of this take, a T-pose
+BIPED_REST = ("movebox_conversation.npz", 30)
 _BONE_CHILD = {"UpperArm": "LowerArm", "LowerArm": "Hand", "UpperLeg": "LowerLeg", "LowerLeg": "Foot"}
 
 
@@ -63,10 +77,20 @@ def skeleton_kind(names):
     raise ValueError("unknown skeleton: none of the known joint naming schemes fits; add a table to retarget.MAPS")
 
 
-def _rest(clip, kind):
-    """Rest rotations [N, 3, 3] and positions [N, 3]: the T-pose first row (cmu31, daz43) or the zero pose."""
+def _rest(clip, kind, rest=None):
+    """Rest rotations [N, 3, 3] and positions [N, 3], facing +Z: those of the clip `rest`, the first row (cmu31) or the zero pose."""
     sk = clip.skeleton
     n = len(sk.names)
+    if rest is not None:
+        at = [rest.skeleton.names.index(name) for name in MAPS[kind].values()]
+        pos, rot = rest.fk()
+        src = [sk.names.index(name) for name in MAPS[kind].values()]
+        left, right = (rest.skeleton.names.index(MAPS[kind][side + "UpperArm"]) for side in ("left", "right"))
+        across = pos[0, left] - pos[0, right]
+        turn = rig.axis_mat("y", np.arctan2(across[2], across[0]))
+        out_rot, out_pos = np.broadcast_to(np.eye(3), (n, 3, 3)).copy(), np.zeros((n, 3))
+        out_rot[src], out_pos[src] = turn @ rot[0, at], pos[0, at] @ turn.T
+        return out_rot, out_pos
     if kind == "cmu31":
         local = clip.local[:1]
     else:
@@ -108,12 +132,13 @@ def resample(quats, root, dt, fps=rig.FPS):
     return q / np.linalg.norm(q, axis=-1, keepdims=True), root
 
 
-def retarget(clip, dt, unit, drop_first=True, name="", scale=None):
-    """Clip -> Take. `dt`: the *true* frame time; `unit`: metres per file unit; `scale`: root scale (default leg ratio)."""
+def retarget(clip, dt, unit, drop_first=True, name="", scale=None, rest=None):
+    """Clip -> Take. `dt`: the *true* frame time; `unit`: metres per file unit; `scale`: root scale (default leg ratio);
+    `rest`: a clip whose first frame is the T-pose, for skeletons whose zero pose is none."""
     kind = skeleton_kind(clip.skeleton.names)
     table = MAPS[kind]
     src = [clip.skeleton.names.index(table[n]) for n in NAMES]
-    rest_rot, rest_pos = _rest(clip, kind)
+    rest_rot, rest_pos = _rest(clip, kind, rest)
     pos, rot = clip.fk()
     if drop_first:
         pos, rot = pos[1:], rot[1:]
@@ -127,7 +152,7 @@ def retarget(clip, dt, unit, drop_first=True, name="", scale=None):
                 b = rig.unit(rest_pos[src[c]] - rest_pos[src[j]])
                 g = g @ rig.between(a[None], b[None])[0]
         out[:, j] = g
-    if kind == "daz43":  # one chest joint: spread abdomen..chest over spine, chest, upperChest
+    if kind in ("daz43", "freemocap"):  # one chest joint: spread abdomen..chest over spine, chest, upperChest
         q = rig.mat_to_quat(out[:, [INDEX["spine"], INDEX["upperChest"]]])
         a, b = q[:, 0], q[:, 1] * np.where(np.sum(q[:, 0] * q[:, 1], -1) < 0, -1, 1)[:, None]
         out[:, INDEX["chest"]] = rig.quat_to_mat(a + b)
@@ -151,6 +176,13 @@ def load_take(path, name, cmu_skeleton=None):
     """Reads and retargets one file of the shared data by the rules of its README (true rates, units)."""
     if path.endswith(".txt"):
         return retarget(read_expmap(path, cmu_skeleton), 1 / 120, CMU_UNIT, True, name)
+    if path.endswith(".npz"):
+        clip = read_npz(path)
+        if skeleton_kind(clip.skeleton.names) != "biped":
+            return retarget(clip, clip.dt, 1.0, False, name)
+        t = read_npz(os.path.join(os.path.dirname(path), BIPED_REST[0]))
+        rest = Clip(t.skeleton, t.root[BIPED_REST[1]:][:1], t.local[BIPED_REST[1]:][:1], t.dt)
+        return retarget(clip, clip.dt, 1.0, False, name, rest=rest)
     clip = read_bvh(path)
     kind = skeleton_kind(clip.skeleton.names)
     if kind == "daz43":

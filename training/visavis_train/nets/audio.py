@@ -31,7 +31,7 @@ class AudioEncoder(nn.Module):
 
     def state(self, batch=1):
         """Left context at the start of a signal: kernel - stride zeros for each convolution."""
-        return [torch.zeros(batch, i, k - s) for i, _, k, s, _ in self.spec]
+        return [torch.zeros(batch, i, k - s, device=self.out.weight.device) for i, _, k, s, _ in self.spec]
 
     def forward(self, wave, state=None):
         """wave [B, 800 T] -> features [B, T, D_a]; a state from `state()` is updated in place for streaming."""

@@ -6,7 +6,7 @@ import torch
 from torch import nn
 import torch.nn.functional as F
 
-from .layers import ModulatedLayer, band_mask, bias_of, gelu, modulated, rotary
+from .layers import Layer, band_mask, bias_of, gelu, modulated, places, rotary
 
 USER, AGENT, VOICE, GAZE = range(4)  # order of the presence flags
 
@@ -24,6 +24,10 @@ class Condition:
     def map(self, f):
         return Condition(f(self.user), f(self.agent), f(self.voice), f(self.gaze), f(self.flags))
 
+    def at(self, tokens):
+        """The conditioning of some tokens (a slice)."""
+        return self.map(lambda t: t[:, tokens])
+
     def dropped(self, *which):
         """The same with the flags of some modalities cleared; all of them without arguments."""
         flags = self.flags.clone()
@@ -35,8 +39,8 @@ def cat_conditions(parts, dim=0):
     return Condition(*(torch.cat([getattr(p, n) for p in parts], dim) for n in ("user", "agent", "voice", "gaze", "flags")))
 
 
-def absent(batch, tokens, audio_features):
-    z = torch.zeros
+def absent(batch, tokens, audio_features, device=None):
+    z = lambda *shape: torch.zeros(*shape, device=device)
     return Condition(z(batch, tokens, 8), z(batch, tokens, 4 * audio_features), z(batch, tokens, 4 * audio_features),
                      z(batch, tokens, 4), z(batch, tokens, 4))
 
@@ -44,7 +48,7 @@ def absent(batch, tokens, audio_features):
 def tau_embedding(tau, width):
     """Sinusoids of 1000 tau, half cosines, half sines: tau [...] -> [..., width]."""
     half = width // 2
-    freq = torch.exp(-math.log(10000.0) * torch.arange(half, dtype=torch.float32) / half)
+    freq = torch.exp(-math.log(10000.0) * torch.arange(half, dtype=torch.float32, device=tau.device) / half)
     angle = 1000.0 * tau.float()[..., None] * freq
     return torch.cat([angle.cos(), angle.sin()], -1)
 
@@ -62,7 +66,7 @@ class FlowNet(nn.Module):
         self.embed_gaze = nn.Linear(4, embed_gaze)
         self.input = nn.Linear(embed_latent + embed_user + 2 * embed_voice + embed_gaze + 4, width)
         self.tau = nn.ModuleDict({"0": nn.Linear(tau_width, tau_width), "2": nn.Linear(tau_width, tau_width)})
-        self.layers = nn.ModuleList(ModulatedLayer(width, heads, mlp, tau_width) for _ in range(layers))
+        self.layers = nn.ModuleList(Layer(width, heads, mlp, tau_width) for _ in range(layers))
         self.final = nn.ModuleDict({"mod": nn.Linear(tau_width, 2 * width), "out": nn.Linear(width, latent)})
         nn.init.zeros_(self.final["mod"].weight)
         nn.init.zeros_(self.final["mod"].bias)
@@ -86,32 +90,36 @@ class FlowNet(nn.Module):
         shift, scale = self.final["mod"](F.silu(c)).chunk(2, -1)
         return self.final["out"](modulated(x, shift, scale))
 
-    def tables(self, count):
-        if count not in self.made:
-            index = torch.arange(count)
-            self.made[count] = (*rotary(index, self.head_dim), bias_of(band_mask(index, self.window)))
-        return self.made[count]
+    def tables(self, count, device):
+        """Rotary tables and bias of `count` tokens in a row."""
+        key = count, str(device)
+        if key not in self.made:
+            index = torch.arange(count, device=device)
+            self.made[key] = places(index, index, self.window, self.head_dim)
+        return self.made[key]
+
+    def pair_tables(self, count, device):
+        """The same for `forward_pair`: `count` history tokens, then `count` current ones of the same positions."""
+        key = -count, str(device)
+        if key not in self.made:
+            index, one = torch.arange(count, device=device), torch.eye(count, dtype=torch.bool, device=device)
+            cos, sin = rotary(index, self.head_dim)
+            band = band_mask(index, self.window)
+            mask = torch.cat([torch.cat([band, torch.zeros_like(band)], 1), torch.cat([band & ~one, one], 1)], 0)
+            self.made[key] = torch.cat([cos, cos]), torch.cat([sin, sin]), bias_of(mask)
+        return self.made[key]
+
+    def run(self, z, tau, conditioning, place, pasts=None):
+        """Rows z [B, R, Dz] at flow times tau [B, 1 or R] -> x1 [B, R, Dz]; `pasts`: a `Past` for each layer, in streaming."""
+        c = self.tau_vector(tau)
+        x = self.tokens(z, conditioning)
+        for layer, past in zip(self.layers, pasts or [None] * len(self.layers)):
+            x = layer(x, place, c, past)
+        return self.finish(x, c).float()
 
     def forward(self, z, tau, cond):
         """z [B, T, Dz] at flow times tau [B, 1 or T] -> x1 [B, T, Dz]; token i attends to i - window + 1 .. i."""
-        return self.run(z, tau, self.conditioning(cond), *self.tables(z.shape[1]))
-
-    def run(self, z, tau, conditioning, cos, sin, bias):
-        c = self.tau_vector(tau)
-        x = self.tokens(z, conditioning)
-        for layer in self.layers:
-            x = layer(x, layer.modulation(c), cos, sin, bias)
-        return self.finish(x, c).float()
-
-    def pair_tables(self, count):
-        """Tables for `forward_pair`: `count` history tokens, then `count` current ones of the same positions."""
-        if -count not in self.made:
-            cos, sin = rotary(torch.arange(count), self.head_dim)
-            band = band_mask(torch.arange(count), self.window)
-            before = band & ~torch.eye(count, dtype=torch.bool)
-            mask = torch.cat([torch.cat([band, torch.zeros_like(band)], 1), torch.cat([before, torch.eye(count, dtype=torch.bool)], 1)], 0)
-            self.made[-count] = (torch.cat([cos, cos]), torch.cat([sin, sin]), bias_of(mask))
-        return self.made[-count]
+        return self.run(z, tau, self.conditioning(cond), self.tables(z.shape[1], z.device))
 
     def forward_pair(self, history, tau_history, z, tau, cond):
         """x1 of every token at its own flow time over a history at another: history, z [B, T, Dz]; taus [B, 1 or T].
@@ -120,4 +128,4 @@ class FlowNet(nn.Module):
         b, t, _ = z.shape
         taus = torch.cat([tau_history.expand(b, t), tau.expand(b, t)], 1)
         conditioning = self.conditioning(cond)
-        return self.run(torch.cat([history, z], 1), taus, torch.cat([conditioning, conditioning], 1), *self.pair_tables(t))[:, t:]
+        return self.run(torch.cat([history, z], 1), taus, torch.cat([conditioning, conditioning], 1), self.pair_tables(t, z.device))[:, t:]

@@ -6,7 +6,7 @@ and is exact against it; it rolls out many sequences at once.
 import torch
 
 from .flow import GAZE, cat_conditions
-from .layers import gelu, modulated, rotary, rotate
+from .layers import Past, bias_of, rotary
 
 
 def branches(cond, gaze):
@@ -28,15 +28,33 @@ def history_time(tau, tau_history=None, clean_from=0.0):
     return tau if tau_history is None or tau < clean_from else max(tau, tau_history)
 
 
+class Sampler:
+    """Midpoint rule over flow times `edges` (ascending, 0 to 1): two evaluations an interval."""
+
+    def __init__(self, edges):
+        self.edges = list(edges)
+        if len(self.edges) < 2 or self.edges[0] != 0 or self.edges[-1] != 1 or any(b <= a for a, b in zip(self.edges, self.edges[1:])):
+            raise ValueError(f"flow times must rise from 0 to 1: {self.edges}")
+        self.taus = [tau for a, b in zip(self.edges, self.edges[1:]) for tau in (a, a + 0.5 * (b - a))]
+
+    def run(self, eps, evaluate):
+        """z at tau = 1 from eps; `evaluate(z, tau, slot)` gives the guided x1."""
+        z = eps
+        for i, (tau, end) in enumerate(zip(self.edges, self.edges[1:])):
+            h = end - tau
+            half = z + 0.5 * h * (evaluate(z, tau, 2 * i) - z) / (1 - tau)
+            tau += 0.5 * h
+            z = z + h * (evaluate(half, tau, 2 * i + 1) - half) / (1 - tau)
+        return z
+
+
+def sampler(steps):
+    """A `Sampler` of so many equal steps, or of the flow times between its steps."""
+    return Sampler([i / steps for i in range(steps + 1)] if isinstance(steps, int) else steps)
+
+
 def midpoint(steps, eps, evaluate):
-    """z at tau = 1 from eps; `evaluate(z, tau, slot)` gives the guided x1."""
-    z, h = eps, 1.0 / steps
-    for i in range(steps):
-        tau = i * h
-        half = z + 0.5 * h * (evaluate(z, tau, 2 * i) - z) / (1 - tau)
-        tau += 0.5 * h
-        z = z + h * (evaluate(half, tau, 2 * i + 1) - half) / (1 - tau)
-    return z
+    return sampler(steps).run(eps, evaluate)
 
 
 class Reference:
@@ -80,14 +98,6 @@ class Reference:
         return self.net(rows, tau, every)[:, -1:]
 
 
-class Cache:
-    """Rotated keys and values of the last window - 1 finished tokens, one ring per layer."""
-
-    def __init__(self, net, batch):
-        shape = (len(net.layers), 2, batch, net.window - 1, net.heads, net.head_dim)
-        self.kv, self.count = torch.zeros(shape), 0
-
-
 class Stream:
     """Streams `batch` sequences at once. Time of network evaluations is proportional to the rows, not to the history."""
 
@@ -96,12 +106,13 @@ class Stream:
         `clean_from`: see `history_time`."""
         if single and tau_history is None:
             raise ValueError("a single-step student needs tau_history")
-        self.net, self.batch, self.steps, self.single = net, batch, steps, single
+        self.net, self.batch, self.single, self.device = net, batch, single, net.input.weight.device
+        self.plan = sampler(steps)
         self.past = lambda tau: history_time(tau, tau_history, 0.0 if single else clean_from)
         self.guidance, self.gaze_guidance, self.gaze = guidance, gaze_guidance, gaze
         self.count = 1 if single else (3 if gaze else 2)
-        slots = 1 if single else 2 * steps
-        self.caches = [Cache(net, self.count * batch) for _ in range(slots)]
+        self.taus = [0.0] if single else self.plan.taus
+        self.pasts = [[Past() for _ in net.layers] for _ in self.taus]
         self.previous, self.position = None, 0
 
     def _stack(self, cond):
@@ -110,47 +121,33 @@ class Stream:
             return self.net.conditioning(cond if self.gaze else cond.dropped(GAZE))
         return self.net.conditioning(branches(cond, self.gaze))
 
-    def _pass(self, cache, rows, taus, conds):
-        """Runs rows [N, R, Dz]; all but the last are finished and enter the cache. Returns x1 of the last row."""
-        net, r = self.net, rows.shape[1]
-        cos, sin = rotary(torch.arange(self.position - r + 1, self.position + 1), net.head_dim)
-        c = net.tau_vector(taus)
-        x = net.tokens(rows, conds)
-        keep = min(cache.count, net.window - 1)
-        for i, layer in enumerate(net.layers):
-            shift1, scale1, gate1, shift2, scale2, gate2 = layer.modulation(c)
-            q, k, v = layer.attn.qkv(modulated(x, shift1, scale1)).unflatten(-1, (3, net.heads, -1)).unbind(2)
-            q, k = rotate(q, cos, sin), rotate(k, cos, sin)
-            old_k, old_v = cache.kv[i][:, :, cache.kv.shape[3] - keep:]
-            all_k, all_v = torch.cat([old_k, k], 1), torch.cat([old_v, v], 1)
-            s = keep + r
-            gap = torch.arange(keep, s)[:, None] - torch.arange(s)[None, :]
-            bias = torch.zeros(r, s).masked_fill((gap < 0) | (gap >= net.window), -1e9)
-            x = x + gate1 * layer.attn.proj(layer.attn.attend(q, all_k, all_v, bias))
-            x = x + gate2 * layer.fc2(gelu(layer.fc1(modulated(x, shift2, scale2))))
-            if r > 1:
-                last = torch.stack([all_k[:, :-1], all_v[:, :-1]])[:, :, -(net.window - 1):]
-                cache.kv[i][:, :, cache.kv.shape[3] - last.shape[2]:] = last
-        cache.count += r - 1
-        return net.finish(x[:, -1:], c[:, -1:])
+    def _pass(self, slot, rows, taus, conds):
+        """Runs rows [N, R, Dz]; all but the last are finished and stay in the slot's past. Returns x1 of the last row."""
+        net, r, pasts = self.net, rows.shape[1], self.pasts[slot]
+        s = len(pasts[0]) + r
+        cos, sin = rotary(torch.arange(self.position - r + 1, self.position + 1, device=self.device), net.head_dim)
+        gap = torch.arange(s - r, s, device=self.device)[:, None] - torch.arange(s, device=self.device)[None, :]
+        x1 = net.run(rows, taus, conds, (cos, sin, bias_of((gap >= 0) & (gap < net.window))), pasts)
+        for past in pasts:
+            past.keep(net.window - 1, provisional=1)
+        return x1[:, -1:]
 
     @torch.no_grad()
     def warm(self, z, eps, cond):
         """Enters finished tokens [B, N, Dz] (the idle clip's) before the first step."""
         for i in range(z.shape[1]):
-            one = lambda t: t[:, i:i + 1]
+            one = slice(i, i + 1)
             if self.previous is not None:
                 self._commit(*self.previous)
-            self.previous = (one(z), one(eps), self._stack(cond.map(one)))
+            self.previous = z[:, one], eps[:, one], self._stack(cond.at(one))
             self.position += 1
 
     def _commit(self, z, eps, cond):
-        for slot, cache in enumerate(self.caches):
-            tau = self.past(0.0 if self.single else slot / (2 * self.steps))
+        """Enters a finished token into the pasts of all slots: the pass needs a row after it, whose result is not used."""
+        for slot, at in enumerate(self.taus):
+            tau = self.past(at)
             done = (tau * z + (1 - tau) * eps).expand(self.batch, -1, -1).repeat(self.count, 1, 1)
-            dummy = torch.cat([done, done], 1)
-            c2 = torch.cat([cond, cond], 1)
-            self._pass(cache, dummy, torch.full((1, 2), float(tau)), c2)
+            self._pass(slot, torch.cat([done, done], 1), torch.full((1, 2), float(tau), device=self.device), torch.cat([cond, cond], 1))
 
     @torch.no_grad()
     def step(self, eps, cond):
@@ -161,16 +158,16 @@ class Stream:
         def rows(z, tau, slot):
             z = z.repeat(self.count, 1, 1)
             if before is None:
-                return self._pass(self.caches[slot], z, torch.full((1, 1), float(tau)), now)
+                return self._pass(slot, z, torch.full((1, 1), float(tau), device=self.device), now)
             history = self.past(tau)
             done = (history * before[0] + (1 - history) * before[1]).repeat(self.count, 1, 1)
-            taus = torch.tensor([[history, tau]], dtype=torch.float32)
-            return self._pass(self.caches[slot], torch.cat([done, z], 1), taus, torch.cat([before[2], now], 1))
+            taus = torch.tensor([[history, tau]], dtype=torch.float32, device=self.device)
+            return self._pass(slot, torch.cat([done, z], 1), taus, torch.cat([before[2], now], 1))
 
         if self.single:
             z = rows(eps, 0.0, 0)
         else:
-            z = midpoint(self.steps, eps, lambda z, tau, slot: combine(rows(z, tau, slot), self.count, self.guidance, self.gaze_guidance))
+            z = self.plan.run(eps, lambda z, tau, slot: combine(rows(z, tau, slot), self.count, self.guidance, self.gaze_guidance))
         self.previous = (z, eps, now)
         self.position += 1
         return z
@@ -180,25 +177,20 @@ class DecoderStream:
     """The VAE's decoder block by block with a cache of keys and values; equals decoding everything at once."""
 
     def __init__(self, decoder, batch):
-        self.net, self.position = decoder, 0
-        self.cache = [None] * len(decoder.layers)
+        self.net, self.position, self.batch = decoder, 0, batch
+        self.pasts = [Past() for _ in decoder.layers]
 
     @torch.no_grad()
     def step(self, z):
         """Latents [B, 1, Dz] (not standardised) -> standardised frames [B, 4, F]."""
-        net, t = self.net, self.net.tokens
+        net, t, device = self.net, self.net.tokens, z.device
         first = net.latent(z)
-        x = torch.cat([first, net.frame_token.expand(len(z), -1, -1)], 1) + net.slot
-        cos, sin = rotary(torch.arange(self.position * t, (self.position + 1) * t), net.head_dim)
-        causal = torch.zeros(t, t).masked_fill(torch.triu(torch.ones(t, t, dtype=torch.bool), 1), -1e9)
-        for i, layer in enumerate(net.layers):
-            q, k, v = layer.attn.qkv(layer.ln1(x)).unflatten(-1, (3, layer.attn.heads, -1)).unbind(2)
-            q, k = rotate(q, cos, sin), rotate(k, cos, sin)
-            if self.cache[i] is not None:
-                k, v = torch.cat([self.cache[i][0], k], 1), torch.cat([self.cache[i][1], v], 1)
-            self.cache[i] = (k[:, -(net.window - 1) * t:], v[:, -(net.window - 1) * t:]) if net.window > 1 else None
-            bias = torch.cat([torch.zeros(t, k.shape[1] - t), causal], 1)
-            x = x + layer.attn.proj(layer.attn.attend(q, k, v, bias))
-            x = x + layer.fc2(gelu(layer.fc1(layer.ln2(x))))
+        x = torch.cat([first, net.frame_token.to(first.dtype).expand(self.batch, -1, -1)], 1) + net.slot
+        cos, sin = rotary(torch.arange(self.position * t, (self.position + 1) * t, device=device), net.head_dim)
+        seen = torch.ones(t, len(self.pasts[0]) + t, dtype=torch.bool, device=device)
+        place = cos, sin, bias_of(seen.tril(len(self.pasts[0])))
+        for layer, past in zip(net.layers, self.pasts):
+            x = layer(x, place, past=past)
+            past.keep((net.window - 1) * t)
         self.position += 1
-        return net.out(net.ln_f(x)[:, 1:])
+        return net.out(net.ln_f(x)[:, 1:].float())

@@ -2,7 +2,7 @@
 import torch
 from torch import nn
 
-from .layers import EPS, Layer, band_mask, bias_of, rotary
+from .layers import EPS, Layer, places
 
 BLOCK = 4
 
@@ -18,19 +18,20 @@ class Stack(nn.Module):
         self.tokens, self.window, self.head_dim = tokens, window, width // heads
         self.made = {}
 
-    def tables(self, blocks):
-        if blocks not in self.made:
-            index = torch.arange(blocks * self.tokens)
-            self.made[blocks] = (*rotary(index, self.head_dim), bias_of(band_mask(index // self.tokens, self.window)))
-        return self.made[blocks]
+    def tables(self, blocks, device):
+        key = blocks, str(device)
+        if key not in self.made:
+            index = torch.arange(blocks * self.tokens, device=device)
+            self.made[key] = places(index, index // self.tokens, self.window, self.head_dim)
+        return self.made[key]
 
     def run(self, x):
         """x [B, K, tokens, width] -> the same shape."""
         b, k, t, w = x.shape
-        cos, sin, bias = self.tables(k)
+        place = self.tables(k, x.device)
         x = (x + self.slot).reshape(b, k * t, w)
         for layer in self.layers:
-            x = layer(x, cos, sin, bias)
+            x = layer(x, place)
         return self.ln_f(x).reshape(b, k, t, w)
 
 
@@ -46,7 +47,7 @@ class Encoder(Stack):
     def forward(self, x):
         """Standardised frames [B, 4 K, F] -> mu, logvar [B, K, Dz]."""
         b, t, _ = x.shape
-        with torch.autocast("cpu", enabled=False):
+        with torch.autocast(x.device.type, enabled=False):
             frames = self.frame(x).reshape(b, t // BLOCK, BLOCK, -1)
         ends = torch.stack([self.mu_token, self.sigma_token]).to(frames.dtype).expand(b, t // BLOCK, 2, -1)
         h = self.run(torch.cat([frames, ends], 2))
@@ -65,7 +66,7 @@ class Decoder(Stack):
         b, k, _ = z.shape
         first = self.latent(z)[:, :, None]
         h = self.run(torch.cat([first, self.frame_token.to(first.dtype).expand(b, k, -1, -1)], 2))
-        with torch.autocast("cpu", enabled=False):  # bf16 would round frames by about 0.3 mm
+        with torch.autocast(z.device.type, enabled=False):  # bf16 would round frames by about 0.3 mm
             return self.out(h[:, :, 1:].float()).reshape(b, k * BLOCK, -1)
 
 
@@ -75,8 +76,12 @@ class Vae(nn.Module):
         self.encoder = Encoder(features, latent, layers, width, heads, mlp, window_blocks)
         self.decoder = Decoder(features, latent, layers, width, heads, mlp, window_blocks)
 
-    def forward(self, x, noise=True):
+    def forward(self, x, noise=True, rough=0.0):
+        """Reconstruction, mu and logvar. `rough`: latents get white noise too, of up to so many of their deviations, another amount each window."""
         mu, logvar = self.encoder(x)
         mu, logvar = mu.float(), logvar.float().clamp(-12, 6)
         z = mu + torch.randn_like(mu) * (0.5 * logvar).exp() if noise else mu
+        if rough:
+            amount = rough * torch.rand(len(mu), 1, 1, device=mu.device)
+            z = z + amount * mu.detach().flatten(0, 1).std(0) * torch.randn_like(mu)
         return self.decoder(z).float(), mu, logvar

@@ -1,50 +1,56 @@
-"""Everything the flow trains on, computed once: latents, roots, user, gaze and voice features of each clip.
+"""What the flow trains on, computed once from a corpus: latents and voice features of each clip, with roots, user and gaze.
 
     python -m visavis_train.train.cache --corpus DIR --vae runs/vae.pt --audio runs/audio.pt --out runs/cache
 
-Writes OUT/{train,val}.pt. Latents are encoded at two phases (frame offsets 4 and 6), so that a window need not start where a clip does; with
-`--phases 1` at one of them, in turn over the clips, for half the time. Without `--vae` the cache lacks latents; `--reuse` by a later call adds them.
+Writes OUT/{train,val}.pt. Latents are encoded at two phases (frame offsets 4 and 6), so that a window need not start where a clip does.
 """
 import argparse
 import os
 
 import torch
 
-from ..corpus import store
+from ..corpus import measures, store
+from ..motion import rig
 from ..nets.audio import AudioEncoder
 from ..nets.vae import Vae
+from . import common
+from .common import mixed
+from .data import Split, expand
+from .geometry import to_world
 from .team import Team
-from .data import Motions, clips, expand, load_motion
 
 PHASES = (4, 6)
-CHUNK, OVERLAP, TOGETHER = 48, 24, 8  # the encoder sees 16 blocks a layer; more overlap changes latents by 0.2 % of their deviation
+CHUNK, OVERLAP = 48, 24  # the encoder sees 16 blocks a layer; more overlap changes latents by 0.2 % of their deviation
+TOGETHER = {"cpu": 8, "cuda": 64}
 
 
-def load_vae(path):
-    state = torch.load(path, weights_only=False)
+def load_vae(path, device="cpu"):
+    """Averaged network, mean and deviation of features, and the checkpoint."""
+    state = common.load(path)
     net = Vae(len(state["mean"]), **state["size"])
     net.load_state_dict(state["ema"])
-    return net.eval(), state["mean"], state["std"], state
+    return net.eval().to(device), state["mean"].to(device), state["std"].to(device), state
 
 
-def load_audio(path):
-    state = torch.load(path, weights_only=False)
+def load_audio(path, device="cpu"):
+    """The averaged encoder of `train.audio`, or the one trained along with a flow."""
+    state = common.load(path)
     net = AudioEncoder(state["spec"], state["features"])
-    net.load_state_dict(state["net"])
-    return net.eval()
+    net.load_state_dict(state["beside"]["audio"]["ema"] if "audio" in state.get("beside", {}) else state["ema"])
+    return net.eval().to(device)
 
 
 @torch.no_grad()
 def encode(vae, x):
     """Standardised frames [4 K, F] -> encoder means [K, Dz], in overlapping chunks, several at a time."""
-    blocks, at = len(x) // 4, {}
+    blocks, at, together = len(x) // 4, {}, TOGETHER[x.device.type]
     for start in range(0, blocks, CHUNK):
         first, last = max(0, start - OVERLAP), min(blocks, start + CHUNK)
         at.setdefault((start - first, last - first), []).append(first)
-    out = torch.empty(blocks, vae.encoder.mu.out_features)
+    out = torch.empty(blocks, vae.encoder.mu.out_features, device=x.device)
     for (lead, length), firsts in at.items():
-        for part in (firsts[i:i + TOGETHER] for i in range(0, len(firsts), TOGETHER)):
-            with torch.autocast("cpu", torch.bfloat16):
+        for part in (firsts[i:i + together] for i in range(0, len(firsts), together)):
+            with mixed(x.device):
                 mu = vae.encoder(torch.stack([x[4 * f:4 * (f + length)] for f in part]))[0]
             for f, m in zip(part, mu.float()):
                 out[f + lead:f + length] = m[lead:]
@@ -53,14 +59,15 @@ def encode(vae, x):
 
 @torch.no_grad()
 def listen(audio, voice, frames, chunk=1500):
-    """i16 samples [800 T] or None -> features [T, D_a] f16."""
+    """i16 samples [800 T] or None -> features [T, D_a] f16, on the CPU."""
     if voice is None:
         return torch.zeros(frames, audio.out.out_features, dtype=torch.float16)
-    wave, state = torch.from_numpy(voice).float()[None] / 32768, audio.state()
+    device = audio.out.weight.device
+    wave, state = torch.from_numpy(voice).to(device).float()[None] / 32768, audio.state()
     parts = []
     for part in wave.split(800 * chunk, 1):
-        with torch.autocast("cpu", torch.bfloat16):
-            parts.append(audio(part, state)[0].half())
+        with mixed(device):
+            parts.append(audio(part, state)[0].half().cpu())
     return torch.cat(parts)
 
 
@@ -69,73 +76,88 @@ def features(audio, clip, frames):
             "has": (clip.agent_voice is not None, clip.user_voice is not None)}
 
 
-def relisten(cache, corpus, split, audio, team, out):
-    """The cache's split with features of another audio encoder; all else as it is, without the voices."""
-    state = torch.load(os.path.join(cache, split + ".pt"), weights_only=False, mmap=True)
-    items = []
-    for item in state["items"][team.rank::team.size]:
-        clip = store.load(os.path.join(corpus, split, item["name"]))
-        items.append({k: v for k, v in item.items() if k != "waves"} | features(audio, clip, len(item["gaze"])))
-    items = team.gather(items, os.path.join(out, f"{split}.part"))
-    if team.leads:
-        torch.save(state | {"items": items}, os.path.join(out, split + ".pt"))
+def latents(clips, vae, mean, std, which):
+    """{clip: [latents of each phase]} of clips `which`."""
+    out = {}
+    for i in which:
+        x = (expand(clips.frames[clips.starts[i]:clips.starts[i + 1]].to(mean.device)) - mean) / std
+        out[i] = [encode(vae, x[p:p + (len(x) - p) // 4 * 4]).cpu() for p in PHASES]
+    return out
+
+
+def heard(clips, audio, which):
+    """{clip: (agent's features, user's features)}."""
+    out = {}
+    for i in which:
+        f = features(audio, store.load(clips.paths[i]), int(clips.starts[i + 1] - clips.starts[i]))
+        out[i] = f["agent"], f["voice"]
+    return out
+
+
+def still(clips):
+    """Frames [N] bool in which both hands are still."""
+    out = []
+    for a, b in zip(clips.starts[:-1].tolist(), clips.starts[1:].tolist()):
+        frames, roots = clips.frames[a:b], clips.roots[a:b]
+        p = to_world(roots, frames[:, 3:3 + 3 * rig.J].unflatten(1, (-1, 3)).double()).numpy()
+        t = measures.tracks(p, rig.axis_mat("y", roots[:, 2].numpy())[:, None])
+        out.append(torch.from_numpy((t["hand_v"] < measures.STILL).all(1)))
+    return torch.cat(out)
+
+
+def joined(clips, made, stats):
+    """The file's tensors of all clips' latents; `stats` None: theirs become the standard."""
+    rows, segments, at = [], [], 0
+    for i in range(len(clips)):
+        for phase, z in zip(PHASES, made[i]):
+            segments.append((i, int(clips.starts[i]) + phase, at, len(z)))
+            rows.append(z)
+            at += len(z)
+    z = torch.cat(rows)
+    mean, std = stats or (z.mean(0), z.std(0).clamp(min=1e-3))
+    return {"z": (z - mean) / std, "segments": torch.tensor(segments), "latent_mean": mean, "latent_std": std}
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--corpus", required=True)
-    parser.add_argument("--vae")
-    parser.add_argument("--audio", required=True)
+    parser.add_argument("--vae", help="needed without --latents-of")
+    parser.add_argument("--audio", help="needed without --features-of")
     parser.add_argument("--out", required=True)
-    parser.add_argument("--conversations", type=int, help="take only this many of a split's conversations (and all captured takes)")
-    parser.add_argument("--phases", type=int, default=2, choices=(1, 2))
+    parser.add_argument("--latents-of", metavar="CACHE", help="take the latents of an earlier cache of this corpus: only the audio encoder has changed")
+    parser.add_argument("--features-of", metavar="CACHE", help="take the voices' features of an earlier cache of this corpus: only the VAE has changed")
+    parser.add_argument("--standard", metavar="FLOW", help="standardise latents as this flow's checkpoint does, not by their own mean and deviation")
     parser.add_argument("--workers", type=int, default=1, help="processes that share the clips")
-    parser.add_argument("--waves", action="store_true", help="keep the voices too (i16), for flow training with --end-to-end")
-    parser.add_argument("--reuse", metavar="CACHE", help="take everything but the latents from an earlier cache of this corpus (same audio encoder)")
-    parser.add_argument("--relisten", metavar="CACHE", help="take everything but the voices' features from an earlier cache of this corpus (same VAE)")
     parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
     args = parser.parse_args()
-    torch.set_num_threads(args.threads)
-    team = Team(args.workers)
-    vae, mean, std, _ = load_vae(args.vae) if args.vae else (None,) * 4
-    audio = load_audio(args.audio)
+    device, team = common.start_process(args), Team(args.workers)
     os.makedirs(args.out, exist_ok=True)
-    stats = None
+    standard = common.load(args.standard) if args.standard else None
+    stats = (standard["latent_mean"], standard["latent_std"]) if standard else None
     for split in ("train", "val"):
-        if args.relisten:
-            relisten(args.relisten, args.corpus, split, audio, team, args.out)
-            continue
-        items, paths, known, poses = [], clips(args.corpus, split), {}, {}
-        if args.reuse and not args.waves:
-            known = {i["name"]: i for i in torch.load(os.path.join(args.reuse, split + ".pt"), weights_only=False, mmap=True)["items"]}
-            poses = dict(zip(map(os.path.basename, paths), Motions(args.corpus, split).items))
-        talks = [p for p in paths if os.path.basename(p).startswith("talk")]
-        skip = set(talks[args.conversations:] if args.conversations else ())
-        for n, path in list(enumerate(p for p in paths if p not in skip))[team.rank::team.size]:
-            name = os.path.basename(path)
-            if name in known:
-                item, frames = dict(known[name]), poses[name]
-            else:
-                clip, frames, roots, gaze = load_motion(path)
-                item = {"name": name, "roots": roots, "user": torch.from_numpy(clip.user_head.copy()), "gaze": gaze, **features(audio, clip, len(frames))}
-            if len(frames) < 4 * 12 + 8:
-                continue
-            item["phases"] = PHASES if args.phases == 2 else PHASES[n // team.size % 2:][:1]
-            x = (expand(frames) - mean) / std if vae else None
-            item["z"] = [encode(vae, x[p:p + (len(x) - p) // 4 * 4]) for p in item["phases"]] if vae else []
-            if args.waves:
-                item["waves"] = [torch.from_numpy(v.copy()) if v is not None else None for v in (clip.agent_voice, clip.user_voice)]
-            items.append(item)
-        items = team.gather(items, os.path.join(args.out, f"{split}.part"))
-        if not team.leads:
-            continue
-        if stats is None and vae:
-            every = torch.cat([i["z"][0] for i in items])
-            stats = every.mean(0), every.std(0).clamp(min=1e-3)
-        for item in items:
-            item["z"] = [(z - stats[0]) / stats[1] for z in item["z"]]
-        torch.save({"items": items} | ({"latent_mean": stats[0], "latent_std": stats[1]} if vae else {}), os.path.join(args.out, split + ".pt"))
-        print(f"{split}: {len(items)} clips, {sum(len(i['gaze']) for i in items) / 108000:.2f} hours", flush=True)
+        clips = team.first(lambda: Split(args.corpus, split, workers=args.workers))
+        mine, state = range(team.rank, len(clips), team.size), {}
+        for source, names in ((args.latents_of, ("z", "segments", "latent_mean", "latent_std")), (args.features_of, ("agent", "voice"))):
+            if source:
+                before = common.load(os.path.join(source, split + ".pt"), mmap=True)
+                if before["names"] != clips.names:
+                    raise SystemExit(f"{source} is not of this corpus' {split} clips")
+                state |= {k: before[k] for k in names}
+        if not args.latents_of:
+            vae, mean, std, _ = load_vae(args.vae, device)
+            parts = team.gather(latents(clips, vae, mean, std, mine), os.path.join(args.out, f"{split}.part"))
+            if team.leads:
+                state |= joined(clips, parts, stats)
+                stats = state["latent_mean"], state["latent_std"]
+        if not args.features_of:
+            parts = team.gather(heard(clips, load_audio(args.audio, device), mine), os.path.join(args.out, f"{split}.part"))
+            if team.leads:
+                state |= {name: torch.cat([parts[i][who] for i in range(len(clips))]) for who, name in enumerate(("agent", "voice"))}
+        if team.leads:
+            shared = {name: getattr(clips, name).clone() for name in ("roots", "user", "gaze")}
+            common.save(os.path.join(args.out, split + ".pt"), names=clips.names, starts=clips.starts, has=clips.has, still=still(clips), **shared, **state)
+            print(f"{split}: {len(clips)} clips, {int(clips.starts[-1]) / 108000:.2f} hours", flush=True)
     team.close()
 
 

@@ -1,44 +1,57 @@
-"""What the training loops share: averages of weights, schedules, checkpoints, logs, and the loop's end itself."""
+"""What the trainers share: their arguments, averages of weights, schedules, checkpoints, logs."""
 import copy
 import json
 import math
 import os
-import time
 
 import torch
-from torch import nn
+
+
+def arguments(parser, steps, lr, batch):
+    """The options of every trainer."""
+    parser.add_argument("--steps", type=int, default=steps, help=f"length of the schedule [{steps}]; the same seed and steps give the same model on one machine")
+    parser.add_argument("--minutes", type=float, help="take as many steps as fit, by the time of the first ones, instead of --steps")
+    parser.add_argument("--lr", type=float, default=lr, help=f"greatest learning rate [{lr}]")
+    parser.add_argument("--batch", type=int, default=batch, help=f"windows of a step and process [{batch}]")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
+    parser.add_argument("--threads", type=int, default=1, help="of each process, on a CPU")
+    parser.add_argument("--workers", type=int, default=1, help="processes, each with batches of its own (CPU)")
+    parser.add_argument("--compile", action="store_true", help="torch.compile the step: minutes at the start, then about 0.7 of a step's time on a CPU")
+    parser.add_argument("--keep-minutes", type=float, default=4.0, help="time between checkpoints [4]; one is written, too, on SIGTERM and SIGINT")
+    parser.add_argument("--resume", action="store_true", help="go on where the checkpoint --out stands")
+
+
+def start_process(args):
+    """Settings of the process; returns the device."""
+    torch.set_num_threads(args.threads)
+    torch.set_float32_matmul_precision("high")
+    torch.manual_seed(getattr(args, "seed", 0))
+    if args.device != "cpu" and args.workers > 1:
+        raise SystemExit("--workers is for CPUs: one process drives a GPU")
+    return torch.device(args.device)
+
+
+def mixed(device):
+    """Matrix products in bf16."""
+    return torch.autocast(torch.device(device).type, torch.bfloat16)
 
 
 class Ema:
     """Exponential moving average of weights; the rate rises from 0 so that early weights do not linger."""
 
     def __init__(self, net, rate=0.999):
-        self.net, self.rate, self.steps = copy.deepcopy(net).eval().requires_grad_(False), rate, 0
+        self.net, self.rate = copy.deepcopy(net).eval().requires_grad_(False), rate
 
     @torch.no_grad()
-    def update(self, net):
-        self.steps += 1
-        rate = min(self.rate, (1 + self.steps) / (10 + self.steps))
+    def update(self, net, step):
+        """`step`: updates so far, this one included."""
+        rate = min(self.rate, (1 + step) / (10 + step))
         torch._foreach_lerp_(list(self.net.parameters()), list(net.parameters()), 1 - rate)
 
 
-class Clock:
-    """Training by wall time: progress 0 .. 1 over `minutes`, over all runs of a resumed training."""
-
-    def __init__(self, minutes, spent=0.0):
-        self.seconds, self.spent, self.start = 60 * minutes, spent, time.monotonic()
-
-    @property
-    def elapsed(self):
-        return self.spent + time.monotonic() - self.start
-
-    @property
-    def progress(self):
-        return min(1.0, self.elapsed / self.seconds)
-
-
 def rate(peak, step, progress, warmup=200, floor=0.02):
-    """Linear warm-up over steps, then a cosine over wall time down to `floor` of the peak."""
+    """Linear warm-up over steps, then a cosine over `progress` 0 .. 1 down to `floor` of the peak."""
     return peak * min(1.0, (step + 1) / warmup) * (floor + (1 - floor) * 0.5 * (1 + math.cos(math.pi * progress)))
 
 
@@ -46,7 +59,7 @@ def optimiser(net, lr, decay=1e-2):
     """AdamW; matrices decay, vectors do not."""
     every = [p for p in net.parameters() if p.requires_grad]
     groups = [{"params": [p for p in every if p.dim() > 1], "weight_decay": decay}, {"params": [p for p in every if p.dim() <= 1], "weight_decay": 0.0}]
-    return torch.optim.AdamW(groups, lr=lr, betas=(0.9, 0.99))
+    return torch.optim.AdamW(groups, lr=lr, betas=(0.9, 0.99), fused=every[0].is_cuda)
 
 
 def set_rate(optim, lr):
@@ -60,80 +73,46 @@ def save(path, **state):
     os.replace(path + ".tmp", path)
 
 
-class Log:
-    """Prints a line and appends it as JSON beside the checkpoint, for `python -m visavis_train.train.curves`."""
+def load(path, **kw):
+    """A checkpoint's tensors and plain values, on the CPU; nothing in a file is run."""
+    return torch.load(path, weights_only=True, map_location="cpu", **kw)
 
-    def __init__(self, path, resume=False):
-        self.path = path
-        if not resume and os.path.exists(path):
-            os.remove(path)
+
+def light(state):
+    """A checkpoint as it travels: averaged weights in f16, no optimiser and no memory of the trainer."""
+    half = lambda kept: {k: v.half() if v.is_floating_point() else v for k, v in kept.items()}
+    beside = {name: {"ema": half(kept["ema"])} for name, kept in state.get("beside", {}).items()}
+    return {k: v for k, v in state.items() if k not in ("net", "optim", "memory")} | {"ema": half(state["ema"]), "beside": beside}
+
+
+def config(out, args):
+    """Writes the arguments of a training to OUT.json; says which of them differ from those it began with."""
+    path, given = out + ".json", {k: v for k, v in vars(args).items() if k != "resume"}
+    if args.resume and os.path.exists(path):
+        with open(path) as f:
+            before = json.load(f)
+        changed = {k: (before[k], v) for k, v in given.items() if k in before and before[k] != v and k not in ("keep_minutes", "threads")}
+        if changed:
+            print("resumed with other arguments: " + ", ".join(f"{k} {a} -> {b}" for k, (a, b) in changed.items()), flush=True)
+    with open(path + ".tmp", "w") as f:
+        json.dump(given, f, indent=1, sort_keys=True)
+    os.replace(path + ".tmp", path)
+
+
+class Log:
+    """Prints a line and appends it as JSON to `path`, for `python -m visavis_train.train.curves`. `step`: what a resumed training starts
+    from; lines after it are dropped, None starts the file anew."""
+
+    def __init__(self, path, step=None):
+        self.path, rows = path, []
+        if step is not None and os.path.exists(path):
+            with open(path) as f:
+                rows = [line for line in f if json.loads(line)["step"] <= step]
+        with open(path, "w") as f:
+            f.writelines(rows)
 
     def write(self, **row):
         row = {k: round(v, 6) if isinstance(v, float) else v for k, v in row.items()}
         print(" ".join(f"{k} {v}" for k, v in row.items()), flush=True)
         with open(self.path, "a") as f:
             f.write(json.dumps(row) + "\n")
-
-
-class Loop:
-    """How every training loop goes on after its loss: gradients averaged over the team, a step at the scheduled rate, the running
-    average of weights, log and checkpoint at `out`.
-
-    `beside`: modules that are trained along and kept by the caller, `averages` theirs. `resume` goes on where `out` stands. `kept`: what else a checkpoint holds."""
-
-    def __init__(self, team, net, out, minutes, lr, warmup=200, average=0.998, resume=False, beside=(), **kept):
-        self.team, self.net, self.out, self.lr, self.warmup, self.kept = team, net, out, lr, warmup, kept
-        self.trained, self.step, spent = nn.ModuleList([net, *beside]), 0, 0.0
-        self.optim = optimiser(self.trained, lr)
-        state = torch.load(out, weights_only=False) if resume else None
-        if state:
-            net.load_state_dict(state["net"])
-            self.optim.load_state_dict(state["optim"])
-            self.step, spent = state["step"], state["elapsed"]
-        self.ema, self.averages = Ema(net, average), [Ema(module, average) for module in beside]
-        if state:
-            self.ema.net.load_state_dict(state["ema"])
-            self.ema.steps = self.step
-        self.clock, self.sums = Clock(minutes, spent), {}
-        self.progress = self.clock.progress
-        self.log = Log(out + ".jsonl", resume) if team.leads else None
-
-    def update(self, loss, /, **parts):
-        """One step down `loss`; `parts` are what the next line of the log averages."""
-        set_rate(self.optim, rate(self.lr, self.step, self.progress, self.warmup))
-        self.optim.zero_grad()
-        loss.backward()
-        self.progress = self.team.average(self.trained, self.clock.progress)
-        nn.utils.clip_grad_norm_(self.trained.parameters(), 1.0)
-        self.optim.step()
-        self.ema.update(self.net)
-        for average, module in zip(self.averages, self.trained[1:]):
-            average.update(module)
-        self.step += 1
-        for name, value in parts.items():
-            self.sums.setdefault(name, []).append(value.item() if torch.is_tensor(value) else value)
-
-    def report(self, every, measure=None, rarely=None):
-        """The leader, each `every` steps: a line of the log, and each `rarely` steps what `measure` says of the averaged net and a checkpoint."""
-        if self.team.leads and self.step % every == 0:
-            measured = self.step % (rarely or every) == 0
-            self.write(measure if measured else None)
-            if measured:
-                self.keep()
-
-    def write(self, measure=None):
-        means = {name: sum(values) / len(values) for name, values in self.sums.items()}
-        self.sums = {}
-        self.log.write(step=self.step, minutes=self.clock.elapsed / 60, **means, **(measure(self.ema.net) if measure else {}))
-
-    def keep(self):
-        """Writes the checkpoint."""
-        save(self.out, net=self.net.state_dict(), ema=self.ema.net.state_dict(), optim=self.optim.state_dict(), step=self.step,
-             elapsed=self.clock.elapsed, **self.kept)
-
-    def finish(self, measure=None):
-        """The last line and checkpoint; waits for the team."""
-        if self.team.leads:
-            self.write(measure)
-            self.keep()
-        self.team.close()

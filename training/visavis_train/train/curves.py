@@ -12,7 +12,9 @@ import matplotlib.pyplot as plt  # noqa: E402
 def draw(path, out):
     with open(path) as f:
         rows = [json.loads(line) for line in f]
-    names = [k for k in dict.fromkeys(k for r in rows for k in r) if k not in ("step", "minutes")]
+    names = [k for k in dict.fromkeys(k for r in rows for k in r) if k not in ("step", "minutes", "progress")]
+    if not names:
+        return
     columns = 4
     lines = -(-len(names) // columns)
     fig, axes = plt.subplots(lines, columns, figsize=(3.2 * columns, 2.2 * lines), squeeze=False)

@@ -1,7 +1,7 @@
 """Goes on with the VAE's decoder alone, on latents like those that sessions give it; the encoder, and a flow trained on its latents, stay valid.
 
     python -m visavis_train.train.decoder --corpus DIR --cache runs/cache --vae runs/vae.pt --flow runs/flow.pt [--student runs/student.pt] \\
-        --out runs/vae-fine.pt --minutes 10
+        --out runs/vae-fine.pt --steps 500
 
 Half of a batch is corpus motion whose latents get noise like the flow's own errors, with the corpus as target. The other half are latents of
 roll-outs, which have no truth: there the decoder stays near what it was, with feet that it means to plant put still, bones of the
@@ -15,9 +15,11 @@ from ..motion import rig
 from ..nets.vae import Vae
 from . import common
 from .cache import load_vae
+from .common import mixed
 from .data import Motions
-from .flow import error_factor
+from .flow import error_factor, load_flow
 from .geometry import FEET, ROOT, integrate, local_positions, to_world
+from .loop import Loop
 from .student import Rollouts
 from .team import Team
 from .vae import channel_weights, evaluate, joint_weights, losses
@@ -35,9 +37,9 @@ def free_losses(y, before, mean, std, weights):
     toes, old = p[:, :, list(TOES)], q[:, :, list(TOES)]
     still = (old[:, 1:, :, 1] < PLANTED[0]) & (old.diff(dim=1).norm(dim=-1) < PLANTED[1])
     slide = ((toes.diff(dim=1)[..., [0, 2]].square().sum(-1) + 1e-8).sqrt() * still).sum() / (still.sum() + 1)
-    bones = (p[:, :, 1:] - p[:, :, list(rig.PARENTS[1:])]).norm(dim=-1) - LENGTHS
+    bones = (p[:, :, 1:] - p[:, :, list(rig.PARENTS[1:])]).norm(dim=-1) - LENGTHS.to(p.device)
     acc = (p.diff(dim=1).diff(dim=1).square().sum(-1) + 1e-8).sqrt().mean(-1)
-    border = (torch.arange(acc.shape[1]) % 4 >= 2).float()
+    border = (torch.arange(acc.shape[1], device=acc.device) % 4 >= 2).float()
     return {"stay": ((y - before).square() * weights).mean(), "free_slide": 10 * slide, "bones": 20 * bones.abs().mean(),
             "jerk": 6 * (acc * (1 + border)).mean()}
 
@@ -45,19 +47,24 @@ def free_losses(y, before, mean, std, weights):
 class Free:
     """Latents of roll-outs [N, K, Dz] as the decoder gets them, a part of them made anew now and then."""
 
-    def __init__(self, rollouts, nets, size=48):
-        self.rollouts, self.nets, self.z, self.size, self.turn = rollouts, nets, [], size, 0
+    def __init__(self, rollouts, net, tau_history, size=48):
+        self.rollouts, self.net, self.tau_history, self.size, self.z = rollouts, net, tau_history, size, None
 
     def refresh(self, batch=12, temperature=0.75):
-        net, tau = self.nets[self.turn % len(self.nets)]
-        z = self.rollouts.make(net, batch, bool(torch.rand(1) < 0.6), tau, temperature)[0]
-        self.turn += 1
-        self.z = (self.z + list(z * self.rollouts.windows.std + self.rollouts.windows.mean))[-self.size:]
+        w = self.rollouts.windows
+        z = self.rollouts.make(self.net, batch, bool(torch.rand(1) < 0.6), self.tau_history, temperature)[1]
+        z = z * w.std.to(z.device) + w.mean.to(z.device)
+        self.z = z if self.z is None else torch.cat([self.z, z])[-self.size:]
 
     def sample(self, batch, blocks):
-        rows = [self.z[i] for i in torch.randint(0, len(self.z), (batch,)).tolist()]
-        at = torch.randint(0, rows[0].shape[0] - blocks + 1, (1,)).item()
-        return torch.stack(rows)[:, at:at + blocks]
+        at = int(torch.randint(0, self.z.shape[1] - blocks + 1, (1,)))
+        return self.z[torch.randint(0, len(self.z), (batch,)).to(self.z.device), at:at + blocks]
+
+    def state_dict(self):
+        return {"z": self.z}
+
+    def load_state_dict(self, state):
+        self.z = state["z"].to(self.rollouts.windows.device)
 
 
 def main():
@@ -65,48 +72,44 @@ def main():
     for name in ("corpus", "cache", "vae", "flow", "out"):
         parser.add_argument(f"--{name}", required=True)
     parser.add_argument("--student", help="roll-outs are this network's; without it only noise like the flow's errors is used")
-    parser.add_argument("--minutes", type=float, default=10)
-    parser.add_argument("--batch", type=int, default=8, help="windows of either half")
     parser.add_argument("--blocks", type=int, default=32)
-    parser.add_argument("--lr", type=float, default=4e-4)
     parser.add_argument("--free", type=float, default=1.0, help="factor on the losses of roll-outs")
     parser.add_argument("--smooth", type=float, default=3.0, help="factor on the corpus half's losses of velocities and accelerations")
     parser.add_argument("--noise", type=float, default=1.2, help="greatest noise, in deviations of the flow's errors")
-    parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--workers", type=int, default=1, help="processes, each with batches of its own")
-    parser.add_argument("--resume", action="store_true")
+    parser.add_argument("--white", type=float, default=0.0, help="greatest white noise besides, in deviations of the latents [0]")
+    parser.add_argument("--temperature", type=float, default=0.75, help="scale of the roll-outs' noise, as sessions use it")
+    common.arguments(parser, steps=500, lr=4e-4, batch=8)
     args = parser.parse_args()
-    torch.set_num_threads(args.threads)
-    torch.manual_seed(0)
-    team, frames = Team(args.workers), 4 * args.blocks
-    train, held = Motions(args.corpus, "train", captured=3.0), Motions(args.corpus, "val")
-    frozen, mean, std, first = load_vae(args.vae)
+    device, team, frames = common.start_process(args), Team(args.workers), 4 * args.blocks
+    train, held = (team.first(lambda: Motions(args.corpus, split, captured=3.0, device=device)) for split in ("train", "val"))
+    frozen, mean, std, first = load_vae(args.vae, device)
     frozen.requires_grad_(False)
-    net, weights = Vae(len(mean), **first["size"]), channel_weights(len(mean))
-    jw = joint_weights((len(mean) - ROOT) // 36)
+    net, weights = Vae(len(mean), **first["size"]).to(device), channel_weights(len(mean)).to(device)
+    jw = joint_weights((len(mean) - ROOT) // 36).to(device)
     jw = jw / jw.mean()
     net.load_state_dict(first["ema"])
     net.encoder.requires_grad_(False)
-    factor = error_factor(args.flow, args.cache)
-    loop = common.Loop(team, net, args.out, args.minutes, args.lr, warmup=50, average=0.995, resume=args.resume, size=first["size"], mean=mean, std=std)
+    factor, deviation = error_factor(args.flow, args.cache, device), common.load(args.flow)["latent_std"].to(device)
     free = None
     if args.student:
-        from ..export import load_flow
-        student, state = load_flow(args.student)
-        windows = Windows(f"{args.cache}/train.pt", 64, 0, 0, 0, 0)
-        free = Free(Rollouts(windows, frozen, mean, std), [(student, state["tau_history"])])
+        student, state = load_flow(args.student, device)
+        windows = Windows(f"{args.cache}/train.pt", 64, 0, 0, 0, 0, device=device)
+        free = Free(Rollouts(windows, frozen, mean, std), student, state["tau_history"])
+    loop = Loop(team, net, args, warmup=50, average=0.995, memory=free, size=first["size"], mean=mean.cpu(), std=std.cpu())
     torch.manual_seed(1)
     check = (held.sample(24, frames) - mean) / std
     measure = lambda net: evaluate(net, check, mean, std)
-    team.seed(2 + loop.step)
-    while loop.progress < 1:
-        if free and (len(free.z) < 24 or loop.step % 60 == 0):
-            free.refresh()
+    for step in loop:
+        for _ in range(2 if free and free.z is None else 1 if free and step % 60 == 0 else 0):
+            free.refresh(temperature=args.temperature)
         x = (train.sample(args.batch, frames) - mean) / std
-        with torch.autocast("cpu", torch.bfloat16):
+        with mixed(device):
             with torch.no_grad():
                 mu, logvar = (t.float() for t in net.encoder(x))
-            z = mu + (torch.randn_like(mu) @ factor.T) * (args.noise * torch.rand(len(mu), 1, 1))
+            amount = lambda most: most * torch.rand(len(mu), 1, 1, device=device)
+            z = mu + amount(args.noise) * (torch.randn_like(mu) @ factor.T)
+            if args.white:
+                z = z + amount(args.white) * deviation * torch.randn_like(mu)
             count = len(z)
             if free:
                 z = torch.cat([z, free.sample(args.batch, args.blocks)])

@@ -1,29 +1,28 @@
 """Trains the flow network on cached latents (x1-prediction, SARAH 3.3).
 
-    python -m visavis_train.train.flow --cache runs/cache --vae runs/vae.pt --out runs/flow.pt --minutes 50
+    python -m visavis_train.train.flow --cache runs/cache --vae runs/vae.pt --out runs/flow.pt --steps 20000
 
 Two regimes share each batch stream: one flow time for the whole window (imputed history, what the reference sampler does), and
 history near tau = 1 with the current block at its own flow time (what the single-step student starts from). `--end-to-end` goes on
-training an existing flow with the audio encoder unfrozen on raw voices (cache made with --waves); hearing a window takes about six times
+training an existing flow with the audio encoder unfrozen on raw voices (--corpus); hearing a window takes about six times
 as long as its step, so that `--live` hears some of each batch.
 """
 import argparse
+import math
 import os
 
 import torch
 
 from ..nets.flow import FlowNet
 from . import common
-from .team import Team
 from .cache import load_audio, load_vae
-from .vae import channel_weights
+from .common import mixed
 from .geometry import ROOT, integrate, local_positions, to_world
-from .windows import Windows
-
-SIZES = {"base": dict(layers=4, width=256, heads=4, mlp=4, tau_width=128, window_blocks=48, embed_latent=128, embed_user=64, embed_voice=96,
-                      embed_gaze=16, user_scale=2.0),
-         "paper": dict(layers=4, width=1024, heads=4, mlp=4, tau_width=256, window_blocks=48, embed_latent=512, embed_user=128, embed_voice=256,
-                       embed_gaze=32, user_scale=2.0)}
+from .loop import Loop
+from .sizes import SIZES
+from .team import Team
+from .vae import channel_weights
+from .windows import Windows, voices_of
 
 
 @torch.no_grad()
@@ -32,12 +31,12 @@ def latent_metric(vae, mean, std, z, latent_mean, latent_std, root=30.0):
 
     Finite differences through the decoder: response of the block's own frames, weighted as in the VAE's loss, and of the world
     positions after it. A latent's plain squared error would lose the root among the other directions."""
-    w = channel_weights(len(mean)) / 10
+    w = channel_weights(len(mean)).to(z.device) / 10
     total = 0
     for row in z:
         base = vae.decoder((row * latent_std + latent_mean)[None])[:, -4:]
         moved = row.repeat(row.shape[-1], 1, 1)
-        moved[:, -1] += 0.1 * torch.eye(row.shape[-1])
+        moved[:, -1] += 0.1 * torch.eye(row.shape[-1], device=z.device)
         y = vae.decoder(moved * latent_std + latent_mean)[:, -4:]
         place = lambda f: to_world(integrate((f * std + mean)[..., :ROOT]), local_positions(f * std + mean)).flatten(1) * root
         d = torch.cat([((y - base) * w.sqrt()).flatten(1) / (4 * len(mean)) ** 0.5, (place(y) - place(base)) / (4 * 22) ** 0.5], 1)
@@ -55,54 +54,70 @@ def noisy(z, tau, eps):
     return tau[..., None] * z + (1 - tau[..., None]) * eps
 
 
-def shared_loss(net, z, cond, metric, slip):
-    """Regime of the reference sampler: one flow time a window. `slip` is the deviation of what history adds to the truth."""
-    b = len(z)
-    tau = (torch.arange(b)[:, None] + torch.rand(b, 1)) / b
-    off = torch.randn_like(z) * (slip * torch.rand(b, 1, 1) * (torch.rand(b, 1, 1) < 0.5))
-    with torch.autocast("cpu", torch.bfloat16):
+def late_weight(tau, late):
+    """Weight of an error at a flow time. x1's error e at tau is an error e / (1 - tau) of the velocity: `late` 2 weighs velocities alike, 0 latents.
+    Held from tau 0.9 on, and 1 on average over 0 .. 1."""
+    held = (1 - tau).clamp(min=0.1) ** -late
+    mean = 0.1 * 0.1 ** -late + (math.log(10) if late == 1 else (0.1 ** (1 - late) - 1) / (late - 1))
+    return held / mean
+
+
+def shared_loss(net, z, cond, metric, slip, weight, late):
+    """Regime of the reference sampler: one flow time a window. `slip` is the deviation of what history adds to the truth; `weight` [B, T] that of
+    each token, `late` as in `late_weight`."""
+    b, uniform = len(z), lambda *shape: torch.rand(*shape, device=z.device)
+    tau = (torch.arange(b, device=z.device)[:, None] + uniform(b, 1)) / b
+    off = torch.randn_like(z) * (slip * uniform(b, 1, 1) * (uniform(b, 1, 1) < 0.5))
+    with mixed(z.device):
         x1 = net(noisy(z + off, tau, torch.randn_like(z)), tau, cond)
-    return x1_error(x1, z, metric).mean()
+    return (x1_error(x1, z, metric) * weight * late_weight(tau, late)).mean()
 
 
-def apart_loss(net, z, cond, metric, slip):
+def apart_loss(net, z, cond, metric, slip, weight, late):
     """Regime of the student: history at tau_h in 0.8 .. 1, each current block at a flow time of its own."""
-    b = len(z)
-    tau_h = 0.8 + 0.2 * torch.rand(b, 1)
-    tau = torch.where(torch.rand(b, 1) < 0.3, torch.zeros(b, 1), torch.rand(b, 1))
-    off = torch.randn_like(z) * (slip * torch.rand(b, 1, 1))
-    with torch.autocast("cpu", torch.bfloat16):
+    b, uniform = len(z), lambda *shape: torch.rand(*shape, device=z.device)
+    tau_h = 0.8 + 0.2 * uniform(b, 1)
+    tau = uniform(b, 1) * (uniform(b, 1) >= 0.3)
+    off = torch.randn_like(z) * (slip * uniform(b, 1, 1))
+    with mixed(z.device):
         x1 = net.forward_pair(noisy(z + off, tau_h, torch.randn_like(z)), tau_h, noisy(z, tau, torch.randn_like(z)), tau, cond)
-    return x1_error(x1, z, metric).mean()
+    return (x1_error(x1, z, metric) * weight * late_weight(tau, late)).mean()
+
+
+def load_flow(path, device="cpu"):
+    """The averaged flow or student of a checkpoint, and the checkpoint."""
+    state = common.load(path)
+    net = FlowNet(state["latent"], state["audio"], **state["size"])
+    net.load_state_dict(state["ema"])
+    return net.eval().to(device), state
 
 
 @torch.no_grad()
-def error_factor(path, cache, tau=0.8, batches=4):
+def error_factor(path, cache, device="cpu", tau=0.8, batches=4):
     """Matrix that turns white noise into noise like the flow's x1 errors at `tau`, in latents as the encoder gives them [Dz, Dz]."""
-    state = torch.load(path, weights_only=False)
-    net = FlowNet(state["latent"], state["audio"], **state["size"])
-    net.load_state_dict(state["ema"])
-    data, errors = Windows(os.path.join(cache, "train.pt"), 64), []
+    net, state = load_flow(path, device)
+    data, errors = Windows(os.path.join(cache, "train.pt"), 64, device=device), []
     for _ in range(batches):
         z, cond = data.batch(12)
-        t = torch.full((len(z), 1), tau)
+        t = torch.full((len(z), 1), tau, device=z.device)
         errors.append((net(noisy(z, t, torch.randn_like(z)), t, cond) - z)[:, 8:].flatten(0, 1))
-    errors = torch.cat(errors) * state["latent_std"]
+    errors = torch.cat(errors).cpu() * state["latent_std"]
     covariance = errors.T @ errors / len(errors)
-    return torch.linalg.cholesky(covariance + 1e-6 * covariance.trace() / len(covariance) * torch.eye(len(covariance)))
+    return torch.linalg.cholesky(covariance + 1e-6 * covariance.trace() / len(covariance) * torch.eye(len(covariance))).to(device)
 
 
 @torch.no_grad()
 def validate(net, held, metric):
     """x1 error by flow time, conditional against unconditional, on the same windows and noise each time."""
-    out = {}
-    with torch.random.fork_rng():
-        torch.manual_seed(1)
-        batches = [(*held.batch(16), torch.randn(16, held.blocks, len(held.mean))) for _ in range(3)]
+    torch.manual_seed(1)
+    out, batches = {}, []
+    for _ in range(3):
+        z, cond = held.batch(16)
+        batches.append((z, cond, torch.randn_like(z)))
     for name, tau in (("0", 0.0), ("3", 0.375), ("6", 0.75)):
         errors, free = [], []
         for z, cond, eps in batches:
-            t = torch.full((len(z), 1), tau)
+            t = torch.full((len(z), 1), tau, device=z.device)
             rows = noisy(z, t, eps)
             errors.append(x1_error(net(rows, t, cond), z, metric)[:, 8:].mean().item())
             free.append(x1_error(net(rows, t, cond.dropped()), z, metric)[:, 8:].mean().item())
@@ -116,63 +131,52 @@ def main():
     parser.add_argument("--vae", required=True)
     parser.add_argument("--out", required=True)
     parser.add_argument("--size", choices=SIZES, default="base")
-    parser.add_argument("--minutes", type=float, default=50)
-    parser.add_argument("--batch", type=int, default=32)
     parser.add_argument("--blocks", type=int, default=64)
-    parser.add_argument("--lr", type=float, default=1.2e-3)
     parser.add_argument("--apart", type=float, default=0.35, help="share of time on the regime with history and current apart")
     parser.add_argument("--slip", type=float, default=0.15)
-    parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--workers", type=int, default=1, help="processes, each with batches of its own")
-    parser.add_argument("--compile", action="store_true", help="torch.compile the losses: minutes at the start, then a step takes 0.7 of its time")
-    parser.add_argument("--resume", action="store_true")
-    parser.add_argument("--end-to-end", metavar="AUDIO", help="audio checkpoint to train along; needs --init and a cache with voices")
+    parser.add_argument("--late", type=float, default=0.0, help="weight on late flow times: errors weigh (1 - tau)^-LATE; 2 weighs velocities alike [0]")
+    parser.add_argument("--still", type=float, default=0.0, help="blocks in which the corpus' hands are still weigh 1 + STILL [0]")
+    parser.add_argument("--end-to-end", metavar="AUDIO", help="audio checkpoint to train along; needs --init and --corpus")
+    parser.add_argument("--corpus", help="corpus of the cache, for --end-to-end")
     parser.add_argument("--live", type=int, help="windows of a batch whose voices --end-to-end hears, others taking cached features [all]")
     parser.add_argument("--init", help="flow checkpoint whose weights to start from")
+    common.arguments(parser, steps=20000, lr=1.2e-3, batch=32)
     args = parser.parse_args()
-    torch.set_num_threads(args.threads)
-    torch.manual_seed(0)
-    team = Team(args.workers)
-    audio = load_audio(args.end_to_end) if args.end_to_end else None
-    if audio and args.resume:
-        audio.load_state_dict(torch.load(args.out + ".audio", weights_only=False)["trained"])
-    train = Windows(os.path.join(args.cache, "train.pt"), args.blocks, audio=audio, live=args.live)
-    vae, mean, std, _ = load_vae(args.vae)
-    plain = Windows(os.path.join(args.cache, "train.pt"), 16, jitter=False)
-    metric = latent_metric(vae, mean, std, plain.batch(24)[0], train.mean, train.std)
-    state = torch.load(args.out, weights_only=False) if args.resume else torch.load(args.init, weights_only=False) if args.init else None
-    size = state["size"] if state else SIZES[args.size]
-    latent, width_a = train.items[0]["z"][0].shape[-1], train.items[0]["agent"].shape[-1]
-    net = FlowNet(latent, width_a, **size)
-    if state and not args.resume:
-        net.load_state_dict(state["net"])
-    loop = common.Loop(team, net, args.out, args.minutes, args.lr, average=0.999, resume=args.resume, beside=[audio] if audio else [], size=size,
-                       latent=latent, audio=width_a, latent_mean=train.mean, latent_std=train.std, metric=metric)
-    heard = loop.averages[0].net if audio else None
-    held = Windows(os.path.join(args.cache, "val.pt"), args.blocks, 0, 0, 0, 0, jitter=False, audio=heard)
-    team.seed(2 + loop.step)
+    device, team = common.start_process(args), Team(args.workers)
+    audio = load_audio(args.end_to_end, device).train() if args.end_to_end else None
+    hearing = {"audio": audio, "voices": team.first(lambda: voices_of(args.corpus, "train", device)), "live": args.live} if audio else {}
+    train = Windows(os.path.join(args.cache, "train.pt"), args.blocks, device=device, **hearing)
+    vae, mean, std, _ = load_vae(args.vae, device)
+    plain = Windows(os.path.join(args.cache, "train.pt"), 16, jitter=False, device=device)
+    metric = latent_metric(vae, mean, std, plain.batch(24)[0], train.mean.to(device), train.std.to(device))
+    first = common.load(args.out if args.resume else args.init) if args.resume or args.init else None
+    size, latent = first["size"] if first else SIZES[args.size]["flow"], train.z.shape[1]
+    net = FlowNet(latent, train.audio_features, **size).to(device)
+    if first:
+        net.load_state_dict(first["net"])
+        metric = first["metric"].to(device) if args.resume else metric
+    spoken = {"spec": audio.spec, "features": train.audio_features} if audio else {}
+    loop = Loop(team, net, args, average=0.999, beside={"audio": audio} if audio else None, size=size, latent=latent, audio=train.audio_features,
+                latent_mean=train.mean, latent_std=train.std, metric=metric.cpu(), **spoken)
+    if audio:
+        hearing = {"audio": loop.averages["audio"].net, "voices": team.first(lambda: voices_of(args.corpus, "val", device))}
+    held = Windows(os.path.join(args.cache, "val.pt"), args.blocks, 0, 0, 0, 0, jitter=False, device=device, **hearing)
     share = args.apart / (args.apart + 2.2 * (1 - args.apart))  # a step of the pair regime costs about 2.2 of the other
-    which = torch.Generator().manual_seed(loop.step)  # the same regime in all processes: none waits for the dearer one
     kinds = {True: apart_loss, False: shared_loss}
     measure = lambda net: validate(net, held, metric)
-
-    def keep_audio():
-        if audio and team.leads:
-            common.save(args.out + ".audio", net=heard.state_dict(), trained=audio.state_dict(), spec=audio.spec, features=width_a)
-
     if args.compile:
         with torch.no_grad():
-            apart_loss(net, *train.batch(2), metric, 0), shared_loss(net, *train.batch(2), metric, 0)  # makes the tables
+            for f in kinds.values():
+                f(net, *train.batch(2), metric, 0, 1.0, 0)  # makes the tables
         kinds = {k: torch.compile(f, dynamic=False) for k, f in kinds.items()}
-    while loop.progress < 1:
-        apart = torch.rand(1, generator=which).item() < share
-        z, cond = train.batch(args.batch)
-        loss = kinds[apart](net, z, cond, metric, args.slip)
+    for step in loop:
+        apart = team.draw(args.seed, step) < share  # the same regime in all processes: none waits for the dearer one
+        place = train.draw(args.batch)
+        z, cond = train.batch(args.batch, place)
+        weight = 1 + args.still * train.stillness(*place)
+        loss = kinds[apart](net, z, cond, metric, args.slip, weight / weight.mean(), args.late)
         loop.update(loss, **{"apart" if apart else "shared": loss})
         loop.report(100, measure, 500)
-        if loop.step % 500 == 0:
-            keep_audio()
-    keep_audio()
     loop.finish(measure)
 
 

@@ -18,7 +18,7 @@ def local_axes(x, joint):
     """The 3x3 matrix (not yet orthogonal) of one joint in the heading frame [..., 3, 3]."""
     verts = x[..., ROOT + 36 * joint:ROOT + 36 * joint + 36].unflatten(-1, (12, 3))
     verts = verts - verts.mean(-2, keepdim=True)
-    return torch.einsum("...va,vb->...ab", verts, torch.as_tensor(ICO, dtype=x.dtype)) / (4 * RADIUS)
+    return torch.einsum("...va,vb->...ab", verts, torch.as_tensor(ICO, dtype=x.dtype, device=x.device)) / (4 * RADIUS)
 
 
 def turn(yaw, x, z):
@@ -54,7 +54,7 @@ def gaze(roots, x, user, eyes, head_back):
     """SARAH 3.4 for feature vectors [..., F] at roots [..., 3] and the user's head [..., 3]: g [...]."""
     axes = local_axes(x, HEAD)
     head = local_positions(x)[..., HEAD, :]
-    eyes, head_back = (torch.as_tensor(v, dtype=x.dtype) for v in (eyes, head_back))
+    eyes, head_back = (torch.as_tensor(v, dtype=x.dtype, device=x.device) for v in (eyes, head_back))
     back = head + axes @ head_back
     front = head + axes @ eyes
     ends = to_world(roots, torch.stack([back, front], -2))

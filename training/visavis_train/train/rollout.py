@@ -45,9 +45,9 @@ class Batch:
 
 
 @torch.no_grad()
-def roll(b, batch, target=None, student=False, steps=4, seed=0, guidance=None, gaze_guidance=None, tau_history=None, clean_from=None, temperature=None):
+def roll(b, batch, target=None, student=False, steps=4, seed=0, guidance=None, gaze_guidance=None, tau_history=None, clean_from=None, temperature=None, correlation=0.0):
     """Generated feature vectors [B, T, F] in metres and roots [B, T, 3]. `target`: gaze score or None. `tau_history`, `clean_from`: see `history_time`; the bundle's by default, 1 and 2 impute history throughout.
-    `temperature` scales the noise that blocks start from; the bundle's by default."""
+    `temperature` scales the noise that blocks start from, the bundle's by default; `correlation`: of that noise from token to token."""
     g = torch.Generator().manual_seed(seed)
     n, session = len(batch), b.config["session"]
     latent, width = b.config["vae"]["latent"], b.config["audio"]["features"]
@@ -61,7 +61,9 @@ def roll(b, batch, target=None, student=False, steps=4, seed=0, guidance=None, g
     idle = b.encode(b.idle()[None]).expand(n, -1, -1)
     m = idle.shape[1]
     noise = lambda k: torch.randn(n, k, latent, generator=g)
-    stream.warm(idle, noise(m), absent(n, m, width))
+    eps = noise(m)
+    stream.warm(idle, eps, absent(n, m, width))
+    eps = eps[:, -1:]
     decoder, place = DecoderStream(b.vae.decoder, n), lambda z: z * b.stat("latent_std") + b.stat("latent_mean")
     for i in range(m):
         decoder.step(place(idle[:, i:i + 1]))
@@ -74,7 +76,8 @@ def roll(b, batch, target=None, student=False, steps=4, seed=0, guidance=None, g
         flags = torch.tensor([[known, 1.0, known, 1.0]]).repeat(n, 1)
         flags[:, 1:3] *= batch.has
         cond = Condition(user, batch.agent[:, now].reshape(n, 1, -1), voice, torch.full((n, 1, 4), float(target or 0)), flags[:, None])
-        x = b.unstandardise(decoder.step(place(stream.step(heat * noise(1), cond))))
+        eps = correlation * eps + (1 - correlation ** 2) ** 0.5 * noise(1)
+        x = b.unstandardise(decoder.step(place(stream.step(heat * eps, cond))))
         path = integrate(x[..., :3].double(), root)
         root = path[:, -1]
         out.append(x)

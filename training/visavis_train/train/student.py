@@ -1,6 +1,6 @@
 """Distils the flow into a network that makes a block in one evaluation (DESIGN 5).
 
-    python -m visavis_train.train.student --cache runs/cache --vae runs/vae.pt --flow runs/flow.pt --out runs/student.pt --minutes 15
+    python -m visavis_train.train.student --cache runs/cache --vae runs/vae.pt --flow runs/flow.pt --out runs/student.pt --steps 3000
 
 The teacher is the multi-step sampler (midpoint 4, guided) started from the same noise, its late evaluations over a clean past; the student sees its
 history at `tau_history` and must give the teacher's block at once. Histories are real ones and the student's own closed-loop roll-outs, in which
@@ -12,18 +12,17 @@ import os
 import numpy as np
 import torch
 
-from ..nets.flow import GAZE, Condition, FlowNet
+from ..nets.flow import GAZE, Condition
 from ..nets.stream import DecoderStream, Stream, branches, combine, history_time, midpoint
 from . import common
-from .team import Team
 from .cache import load_vae
-from .flow import noisy, x1_error
+from .common import mixed
+from .flow import latent_metric, load_flow, noisy, x1_error
 from .geometry import integrate, to_local
+from .loop import Loop
+from .matching import Adversary, Critic, Judge
+from .team import Team
 from .windows import Windows
-
-
-def pick(c, rows):
-    return c.map(lambda t: t[rows])
 
 
 @torch.no_grad()
@@ -32,9 +31,9 @@ def teach(net, history, eps, cond, gaze, guidance, gaze_guidance, steps=4, tau_h
     stacked, count = branches(cond, gaze), 3 if gaze else 2
 
     def evaluate(z, tau, slot):
-        past, now = torch.full((1, 1), history_time(tau, tau_history, clean_from)), torch.full((1, 1), tau)
+        past, now = (torch.full((1, 1), t, device=eps.device) for t in (history_time(tau, tau_history, clean_from), tau))
         rows = noisy(history, past, eps)
-        with torch.autocast("cpu", torch.bfloat16):
+        with mixed(eps.device):
             x1 = net.forward_pair(rows.repeat(count, 1, 1), past, z.repeat(count, 1, 1), now, stacked)
         return combine(x1, count, guidance, gaze_guidance)
 
@@ -49,33 +48,59 @@ class Rollouts:
 
     @torch.no_grad()
     def make(self, net, size, gaze, tau_history, temperature=1.0):
-        """Latents, noise and conditions of `size` windows."""
+        """Places, latents, noise and conditions of `size` windows."""
         w, n, warm = self.windows, self.windows.blocks, self.warm
-        picks, cuts, worlds, starts = torch.multinomial(w.weights, size, replacement=True).tolist(), [], [], []
-        for i in picks:
-            item, phase = w.items[i], int(torch.randint(0, len(w.items[i]["phases"]), (1,)))
-            at = int(torch.randint(0, len(item["z"][phase]) - n + 1, (1,)))
-            first = item["phases"][phase] + 4 * at
-            cuts.append(w.cut(item, phase, at, n))
-            worlds.append(item["user"][first:first + 4 * n].double())
-            starts.append(item["roots"][first + 4 * warm - 1])
-        z, user, agent, voice, g, flags = (torch.stack(c) for c in zip(*cuts))
-        cond = Condition(user.flatten(2), agent, voice, g, flags[:, None].repeat(1, n, 1))
-        cond = targets(cond, gaze)
-        eps, root, worlds = temperature * torch.randn_like(z), torch.stack(starts), torch.stack(worlds)
+        mean, std = w.mean.to(w.device), w.std.to(w.device)
+        place = w.draw(size)
+        z, cond = w.read(*place)
+        cond, frames = targets(cond, gaze), w.frames(*place)
+        eps, root = temperature * torch.randn_like(z), w.roots[frames[:, 4 * warm + 3]]
         stream = Stream(net, size, gaze=gaze, tau_history=tau_history, single=True)
-        at = lambda c, k: c.map(lambda t: t[:, k:k + 1])
-        stream.warm(z[:, :warm], eps[:, :warm], cond.map(lambda t: t[:, :warm]))
-        decoder, place = DecoderStream(self.decoder, size), lambda z: z * w.std + w.mean
+        stream.warm(z[:, :warm], eps[:, :warm], cond.at(slice(warm)))
+        decoder, placed = DecoderStream(self.decoder, size), lambda z: z * std + mean
         for k in range(warm):
-            decoder.step(place(z[:, k:k + 1]))
+            decoder.step(placed(z[:, k:k + 1]))
         for k in range(warm, n):
-            cond.user[:, k] = to_local(root, worlds[:, 4 * k - 4:4 * k][..., [0, 2]]).float().flatten(1)
-            new = stream.step(eps[:, k:k + 1], at(cond, k))
+            now = slice(k, k + 1)
+            user = w.user[frames[:, 4 * k:4 * k + 4]]  # block k - 1's: `frames` begin with the block before the window
+            cond.user[:, k] = to_local(root, user[..., [0, 2]].double()).float().flatten(1)
+            new = stream.step(eps[:, now], cond.at(now))
             z[:, k] = new[:, 0]
-            x = decoder.step(place(new)) * self.std + self.mean
+            x = decoder.step(placed(new)) * self.std + self.mean
             root = integrate(x[..., :3].double(), root)[:, -1]
-        return z, eps, cond
+        return place, z, eps, cond
+
+
+class Memory:
+    """The last `size` sequences with their teacher's blocks. Voices' features are not kept but read again at their places."""
+
+    def __init__(self, windows, size):
+        self.windows, self.size, self.count, self.kept = windows, size, 0, {}
+
+    def add(self, place, history, eps, wish, cond, own):
+        rows = {"segment": place[0], "at": place[1], "history": history, "eps": eps, "wish": wish, "user": cond.user, "gaze": cond.gaze,
+                "flags": cond.flags, "own": torch.full((len(eps),), own)}
+        slots = torch.arange(self.count, self.count + len(eps)) % self.size
+        for name, value in rows.items():
+            if name not in self.kept:
+                self.kept[name] = torch.zeros((self.size, *value.shape[1:]), dtype=value.dtype, device=value.device)
+            self.kept[name][slots.to(value.device)] = value
+        self.count += len(eps)
+
+    def pick(self, fresh, batch):
+        """The `fresh` newest sequences, and random ones to make up `batch`: history, eps, wish, condition, own, places."""
+        newest = torch.arange(self.count - fresh, self.count) % self.size
+        rows = torch.cat([newest, torch.randint(0, min(self.count, self.size), (batch,))])[:batch]
+        at = lambda name: self.kept[name][rows.to(self.kept[name].device)]
+        where = at("segment"), at("at")
+        heard = self.windows.read(*where)[1]
+        return at("history"), at("eps"), at("wish"), Condition(at("user"), heard.agent, heard.voice, at("gaze"), at("flags")), at("own"), where
+
+    def state_dict(self):
+        return {"count": self.count, "kept": self.kept}
+
+    def load_state_dict(self, state):
+        self.count, self.kept = state["count"], {k: v.to("cpu" if k in ("segment", "at", "own") else self.windows.device) for k, v in state["kept"].items()}
 
 
 def targets(cond, gaze):
@@ -83,7 +108,7 @@ def targets(cond, gaze):
     if not gaze:
         return cond.dropped(GAZE)
     b = len(cond.gaze)
-    wish = torch.where(torch.rand(b, 1, 1) < 0.3, torch.randint(0, 2, (b, 1, 1)).float(), torch.rand(b, 1, 1) * 1.1 - 0.1)
+    wish = torch.where(torch.rand(b, 1, 1) < 0.3, torch.randint(0, 2, (b, 1, 1)).float(), torch.rand(b, 1, 1) * 1.1 - 0.1).to(cond.gaze.device)
     flags = cond.flags.clone()
     flags[..., GAZE] = 1
     return Condition(cond.user, cond.agent, cond.voice, wish.expand_as(cond.gaze).clone(), flags)
@@ -91,7 +116,7 @@ def targets(cond, gaze):
 
 def beginning(flow, init=None, change=None):
     """Weights to start from: the flow's, those of the checkpoint `init`, or the flow's with the `change` from one checkpoint to another."""
-    ema = lambda path: torch.load(path, weights_only=False)["ema"]
+    ema = lambda path: common.load(path)["ema"]
     if init:
         return ema(init)
     if not change:
@@ -104,8 +129,8 @@ def calibrated(cond, pairs):
     """The condition with its gaze targets replaced by what the teacher must be asked for to give them: `pairs` are (target, asked)."""
     if not pairs:
         return cond
-    asked = np.interp(cond.gaze.numpy(), *zip(*pairs))
-    return Condition(cond.user, cond.agent, cond.voice, torch.from_numpy(asked).float(), cond.flags)
+    asked = np.interp(cond.gaze.cpu().numpy(), *zip(*pairs))
+    return Condition(cond.user, cond.agent, cond.voice, torch.from_numpy(asked).float().to(cond.gaze.device), cond.flags)
 
 
 def pairs(text):
@@ -117,9 +142,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     for name in ("cache", "vae", "flow", "out"):
         parser.add_argument(f"--{name}", required=True)
-    parser.add_argument("--minutes", type=float, default=15)
     parser.add_argument("--blocks", type=int, default=64)
-    parser.add_argument("--batch", type=int, default=16)
     parser.add_argument("--teach", type=int, default=8, help="sequences of a teacher pass")
     parser.add_argument("--reuse", type=int, default=4, help="student updates for each teacher pass")
     parser.add_argument("--own", type=float, default=0.5, help="share of teacher passes over the student's own roll-outs")
@@ -131,56 +154,60 @@ def main():
     parser.add_argument("--clean-from", type=float, default=0.3,
                         help="the teacher imputes history below this flow time and sees it at --tau-history from there; above 1: always imputed")
     parser.add_argument("--temperature", type=float, default=0.75, help="scale of the noise, as sessions use it")
-    parser.add_argument("--lr", type=float, default=4e-4)
-    parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--init", help="student checkpoint to start from; without it the flow")
     parser.add_argument("--init-change", nargs=2, metavar=("FLOW", "STUDENT"),
                         help="start from --flow changed as this earlier flow was on the way to its student: much nearer than the flow itself")
-    parser.add_argument("--workers", type=int, default=1, help="processes, each with teacher passes of its own")
-    parser.add_argument("--resume", action="store_true")
+    parser.add_argument("--matching", type=float, default=0.0, help="weight of distribution matching (train/matching.py) [0]")
+    parser.add_argument("--adversarial", type=float, default=0.0, help="weight of the adversarial loss on decoded motion [0]")
+    parser.add_argument("--memory", type=int, default=800, help="sequences that updates draw on")
+    common.arguments(parser, steps=3000, lr=4e-4, batch=16)
     args = parser.parse_args()
-    torch.set_num_threads(args.threads)
-    torch.manual_seed(3)
-    team = Team(args.workers)
-    windows = Windows(os.path.join(args.cache, "train.pt"), args.blocks, 0.03, 0.02, 0, 0.05)
-    vae, mean, std, _ = load_vae(args.vae)
-    base = torch.load(args.flow, weights_only=False)
-    teacher, net = (FlowNet(base["latent"], base["audio"], **base["size"]) for _ in range(2))
-    teacher.load_state_dict(base["ema"])
-    teacher.eval().requires_grad_(False)
+    device, team = common.start_process(args), Team(args.workers)
+    windows = Windows(os.path.join(args.cache, "train.pt"), args.blocks, 0.03, 0.02, 0, 0.05, device=device)
+    vae, mean, std, _ = load_vae(args.vae, device)
+    vae.requires_grad_(False)
+    (teacher, base), (net, _) = load_flow(args.flow, device), load_flow(args.flow, device)
+    teacher.requires_grad_(False)
     net.load_state_dict(beginning(base["ema"], args.init, args.init_change))
-    metric, kept = base["metric"], {k: base[k] for k in ("size", "latent", "audio", "latent_mean", "latent_std", "metric")}
-    loop = common.Loop(team, net, args.out, args.minutes, args.lr, warmup=50, resume=args.resume, tau_history=args.tau_history, guidance=args.guidance,
-                       gaze_guidance=args.gaze_guidance, **kept)
-    rollouts = Rollouts(windows, vae, mean, std)
-    which = torch.Generator().manual_seed(loop.step)  # the same kind of pass in all processes: none waits for the dearer one
-    team.seed(4 + loop.step)
-    store = []
-    while loop.progress < 1:
-        gaze = bool(torch.rand(1) < 0.6)
-        own = bool(torch.rand(1, generator=which) < args.own * min(1.0, loop.step / 200))
-        if own:
-            history, eps, cond = rollouts.make(loop.ema.net, args.teach, gaze, args.tau_history, args.temperature)
-        else:
-            history, cond = windows.batch(args.teach)
-            cond, eps = targets(cond, gaze), args.temperature * torch.randn_like(history)
-        wish = teach(teacher, history, eps, calibrated(cond, args.gaze_map) if gaze else cond, gaze, args.guidance, args.gaze_guidance,
-                     tau_history=args.tau_history, clean_from=args.clean_from)
-        for row in range(args.teach):
-            store.append((history[row], eps[row], wish[row], pick(cond, row), own))
-        store = store[-800:]
-        for _ in range(args.reuse):
-            fresh = list(range(max(0, len(store) - args.teach), len(store)))
-            rows = (fresh + torch.randint(0, len(store), (args.batch,)).tolist())[:args.batch]
-            h, e, w = (torch.stack([store[i][k] for i in rows]) for k in range(3))
-            c = Condition(*(torch.stack([getattr(store[i][3], n) for i in rows]) for n in ("user", "agent", "voice", "gaze", "flags")))
-            tau = torch.full((1, 1), args.tau_history)
-            with torch.autocast("cpu", torch.bfloat16):
-                x1 = net.forward_pair(noisy(h, tau, e), tau, e, torch.zeros(1, 1), c)
-            error = x1_error(x1, w, metric)[:, 4:].mean(1)
-            own = [v for v, i in zip(error.tolist(), rows) if store[i][4]]
-            loop.update(error.mean(), loss=error.mean(), **({"own": sum(own) / len(own)} if own else {}))
-            loop.report(100)
+    if not torch.allclose(base["latent_mean"], windows.mean, atol=1e-4):
+        raise SystemExit(f"{args.cache} standardises latents otherwise than {args.flow}: make it with --standard {args.flow}")
+    if "metric" not in base:  # a bundle's
+        base["metric"] = latent_metric(vae, mean, std, windows.batch(24)[0][:, :16], windows.mean.to(device), windows.std.to(device)).cpu()
+    metric, kept = base["metric"].to(device), {k: base[k] for k in ("size", "latent", "audio", "latent_mean", "latent_std", "metric")}
+    memory = Memory(windows, args.memory)
+    decode = lambda z: vae.decoder(z * windows.std.to(device) + windows.mean.to(device)) * std + mean
+    critic = Critic(load_flow(args.flow, device)[0].train(), teacher) if args.matching else None
+    adversary = Adversary(Judge().to(device), decode) if args.adversarial else None
+    beside = ({"critic": critic.net} if critic else {}) | ({"judge": adversary.judge} if adversary else {})
+    loop = Loop(team, net.train(), args, warmup=50, beside=beside, memory=memory, tau_history=args.tau_history, guidance=args.guidance,
+                gaze_guidance=args.gaze_guidance, temperature=args.temperature, **kept)
+    rollouts, tau = Rollouts(windows, vae, mean, std), torch.full((1, 1), args.tau_history, device=device)
+    for step in loop:
+        if step % args.reuse == 0 or not memory.count:
+            gaze = bool(torch.rand(1) < 0.6)
+            own = team.draw(args.seed, step) < args.own * min(1.0, step / 200)  # the same kind of pass in all processes: none waits for the dearer one
+            if own:
+                place, history, eps, cond = rollouts.make(loop.ema.net, args.teach, gaze, args.tau_history, args.temperature)
+            else:
+                place = windows.draw(args.teach)
+                history, cond = windows.batch(args.teach, place)
+                cond, eps = targets(cond, gaze), args.temperature * torch.randn_like(history)
+            wish = teach(teacher, history, eps, calibrated(cond, args.gaze_map) if gaze else cond, gaze, args.guidance, args.gaze_guidance,
+                         tau_history=args.tau_history, clean_from=args.clean_from)
+            memory.add(place, history, eps, wish, cond, own)
+        history, eps, wish, cond, own, where = memory.pick(args.teach, args.batch)
+        with mixed(device):
+            x1 = net.forward_pair(noisy(history, tau, eps), tau, eps, torch.zeros(1, 1, device=device), cond)
+        error = x1_error(x1, wish, metric)[:, 4:].mean(1)
+        loss, parts = error.mean(), {"loss": error.mean()} | ({"own": error[own.to(device)].mean()} if own.any() else {})
+        if critic:
+            move, told = critic.losses(history, tau, eps, x1, cond, metric)
+            loss, parts = loss + args.matching * move + told, parts | {"matching": move, "critic": told}
+        if adversary:
+            move, told = adversary.losses(x1, windows.read(*where)[0])
+            loss, parts = loss + args.adversarial * move + told, parts | {"adversarial": move, "judge": told}
+        loop.update(loss, **parts)
+        loop.report(100)
     loop.finish()
 
 

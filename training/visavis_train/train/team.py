@@ -33,37 +33,59 @@ class Team:
         """Whether this process logs, validates and saves."""
         return self.rank == 0
 
-    def seed(self, seed):
-        torch.manual_seed(seed + 1000003 * self.rank)
+    def seed(self, seed, step=0):
+        """Seeds this process for a step: numbers that no other step or process draws."""
+        torch.manual_seed((seed * 1000003 + self.rank) * 1000003 + step)
+
+    @staticmethod
+    def draw(seed, step):
+        """A number in 0 .. 1 that all processes draw alike for a step."""
+        return torch.rand(1, generator=torch.Generator().manual_seed(seed * 1000003 + step)).item()
+
+    def agree(self, value):
+        """The leader's whole number, in all processes."""
+        if self.size == 1:
+            return value
+        shared = torch.tensor([value])
+        dist.broadcast(shared, 0)
+        return int(shared)
+
+    def first(self, make):
+        """What `make` gives; the leader calls it before the others, who then find what it left on disk."""
+        made = make() if self.leads else None
+        if self.size > 1:
+            dist.barrier()
+        return made if self.leads else make()
 
     @torch.no_grad()
-    def average(self, net, progress):
-        """Averages the gradients of `net` in place; returns the leader's `progress`, so that all stop at one step."""
+    def average(self, net, stop=False):
+        """Averages the gradients of `net` in place; returns whether the leader wants to `stop`, so that all do at one step."""
         if self.size == 1:
-            return progress
+            return stop
         grads = [p.grad if p.grad is not None else torch.zeros_like(p) for p in net.parameters() if p.requires_grad]
-        flat = torch.cat([g.flatten() for g in grads] + [torch.tensor([progress * self.size if self.leads else 0.0])])
+        flat = torch.cat([g.flatten() for g in grads] + [torch.tensor([float(stop and self.leads)])])
         dist.all_reduce(flat)
+        stop = bool(flat[-1] > 0)
         flat /= self.size
         at = 0
         for p, g in zip((p for p in net.parameters() if p.requires_grad), grads):
             p.grad = flat[at:at + g.numel()].view_as(g)
             at += g.numel()
-        return float(flat[-1])
+        return stop
 
     def gather(self, items, path):
-        """The leader gets the items of all, through files beside `path`; the others get an empty list."""
+        """The leader gets the dictionaries of all as one, through files beside `path`; the others get an empty one."""
         if self.size == 1:
             return items
         if not self.leads:
             torch.save(items, f"{path}{self.rank}")
         dist.barrier()
-        if not self.leads:
-            return []
-        for rank in range(1, self.size):
-            items = items + torch.load(f"{path}{rank}", weights_only=False)
-            os.remove(f"{path}{rank}")
-        return items
+        if self.leads:
+            for rank in range(1, self.size):
+                items = items | torch.load(f"{path}{rank}", weights_only=True)
+                os.remove(f"{path}{rank}")
+        dist.barrier()
+        return items if self.leads else {}
 
     def close(self):
         """Waits for the helpers; an error of one is an error here."""

@@ -1,26 +1,25 @@
 """Trains the motion VAE.
 
-    python -m visavis_train.train.vae --corpus DIR --out runs/vae.pt --minutes 25
+    python -m visavis_train.train.vae --corpus DIR --out runs/vae.pt --steps 4000
 
 Loss: standardised features with the root, hands, feet and head weighted up; angles between the joints' rotations; joint positions in metres
 after the root is integrated over short horizons, their velocity and acceleration (across block borders above all), speed of feet that the data
 keeps planted; KL.
 """
 import argparse
-import os
 
 import torch
-from torch import nn
 
 from ..motion.features import RADIUS
 from ..nets.vae import Vae
 from . import common
-from .team import Team
+from .common import mixed
 from .data import Motions, statistics
 from .geometry import FEET, HANDS, ROOT, integrate, local_positions, to_world
+from .loop import Loop
+from .sizes import SIZES
+from .team import Team
 
-SIZES = {"base": dict(latent=64, layers=4, width=192, heads=4, mlp=4, window_blocks=16),
-         "paper": dict(latent=256, layers=9, width=256, heads=4, mlp=4, window_blocks=16)}
 HORIZON = 16
 JOINT_WEIGHTS = {5: 2.0, 8: 1.5, 12: 1.5, 9: 3.0, 13: 3.0, 16: 2.0, 17: 2.0, 20: 2.0, 21: 2.0}
 
@@ -57,7 +56,7 @@ def losses(x, y, mean, std, mu, logvar, weights, jw):
     rotation = (rotations_apart(a, b) * jw).mean()
     norm = lambda d, w=1.0: ((d.square().sum(-1) + 1e-8).sqrt() * jw * w).mean()
     vp, vq = p.diff(dim=2), q.diff(dim=2)
-    border = 1 + 2.0 * (torch.arange(HORIZON - 2) % 4 >= 2).float()[:, None]  # accelerations across block borders weigh more
+    border = 1 + 2.0 * (torch.arange(HORIZON - 2, device=x.device) % 4 >= 2).float()[:, None]  # accelerations across block borders weigh more
     feet = list(FEET)
     planted = (vp[..., feet, :].square().sum(-1) < 0.002 ** 2).float()
     slide = ((vq[..., feet, :].square().sum(-1) + 1e-8).sqrt() * planted).sum() / (planted.sum() + 1)
@@ -69,7 +68,7 @@ def losses(x, y, mean, std, mu, logvar, weights, jw):
 def start_from_principal(net, x, weights):
     """First and last maps start at the principal components of (weighted) frames: the network begins with the pose basis."""
     scale = weights.sqrt()
-    _, s, v = torch.linalg.svd((x * scale)[torch.randperm(len(x))[:20000]], full_matrices=False)
+    _, s, v = torch.linalg.svd((x * scale)[torch.randperm(len(x))[:20000].to(x.device)], full_matrices=False)
     width = net.encoder.frame.out_features
     sd, v = s[:width] / min(len(x), 20000) ** 0.5, v[:width]
     with torch.no_grad():
@@ -92,7 +91,7 @@ def evaluate(net, x, mean, std):
     va, vb = pa.diff(dim=1)[:, :, feet], pb.diff(dim=1)[:, :, feet]
     planted = va.norm(dim=-1) < 0.002
     acc = pb.diff(dim=1).diff(dim=1).norm(dim=-1).mean(-1)
-    border = torch.arange(acc.shape[1]) % 4 >= 2
+    border = torch.arange(acc.shape[1], device=acc.device) % 4 >= 2
     return {"rotation_deg": 57.3 * rotations_apart(a, b).mean().item(), "joints_mm": error.mean().item(), "hands_mm": error[..., list(HANDS)].mean().item(), "feet_mm": error[..., feet].mean().item(),
             "root_step_mm": ((a - b)[..., :2].norm(dim=-1) * 1000).mean().item(), "root_1s_mm": drift[:, 29].mean().item(),
             "root_end_mm": drift[:, -1].mean().item(), "yaw_end_deg": (ra - rb)[:, -1, 2].abs().mean().item() * 57.3,
@@ -104,60 +103,50 @@ def main():
     parser.add_argument("--corpus", required=True)
     parser.add_argument("--out", required=True)
     parser.add_argument("--size", choices=SIZES, default="base")
-    parser.add_argument("--minutes", type=float, default=25)
-    parser.add_argument("--batch", type=int, default=16)
     parser.add_argument("--blocks", type=int, default=32)
-    parser.add_argument("--lr", type=float, default=1.5e-3)
     parser.add_argument("--kl", type=float, default=2e-5)
-    parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--workers", type=int, default=1, help="processes, each with batches of its own")
     parser.add_argument("--limit", type=int, help="take at most this many clips")
     parser.add_argument("--captured", type=float, default=3.0, help="captured takes are drawn this many times as often as their length says")
-    parser.add_argument("--compile", action="store_true", help="torch.compile the step: minutes at the start, then a step takes 0.7 of its time")
     parser.add_argument("--init", help="checkpoint whose weights to start from (schedule starts anew)")
     parser.add_argument("--smooth", type=float, default=1.0, help="factor on the loss of velocities and accelerations")
+    parser.add_argument("--rough", type=float, default=0.0, help="greatest white noise on the latents that are decoded, in deviations of the latents [0]: makes "
+                        "small noise mean little motion")
     parser.add_argument("--evaluate", metavar="SPLIT", help="only print how well --out reconstructs that split")
-    parser.add_argument("--resume", action="store_true")
+    common.arguments(parser, steps=4000, lr=1.5e-3, batch=16)
     args = parser.parse_args()
-    torch.set_num_threads(args.threads)
-    torch.manual_seed(0)
+    device = common.start_process(args)
     if args.evaluate:
-        state = torch.load(args.out, weights_only=False)
+        state = common.load(args.out)
         net = Vae(len(state["mean"]), **state["size"])
         net.load_state_dict(state["ema"])
         x = (Motions(args.corpus, args.evaluate, args.limit).sample(48, 4 * args.blocks) - state["mean"]) / state["std"]
         return print({k: round(v, 2) for k, v in evaluate(net.eval(), x, state["mean"], state["std"]).items()})
     team = Team(args.workers)
-    train, held = Motions(args.corpus, "train", args.limit, args.captured), Motions(args.corpus, "val", args.limit)
-    if not train.items:
+    motions = lambda split, **kw: team.first(lambda: Motions(args.corpus, split, args.limit, device=device, workers=args.workers, **kw))
+    train, held = motions("train", captured=args.captured), motions("val")
+    if not train.size:
         raise SystemExit(f"no clips under {args.corpus}/train: build the corpus first (python -m visavis_train.corpus)")
-    state = torch.load(args.out, weights_only=False) if args.resume else None
-    first = torch.load(args.init, weights_only=False) if args.init else state
-    size = first["size"] if first else SIZES[args.size]
-    if first:
-        mean, std = first["mean"], first["std"]
-        features = len(mean)
-    else:
-        mean, std, every = statistics(train)
-        features = len(mean)
-    net, weights, frames = Vae(features, **size), channel_weights(features), 4 * args.blocks
-    jw = joint_weights((features - ROOT) // 36)
+    first = common.load(args.out if args.resume else args.init) if args.resume or args.init else None
+    size = first["size"] if first else SIZES[args.size]["vae"]
+    mean, std, every = (*(first[k].to(device) for k in ("mean", "std")), None) if first else statistics(train)
+    features = len(mean)
+    net, weights, frames = Vae(features, **size).to(device), channel_weights(features).to(device), 4 * args.blocks
+    jw = joint_weights((features - ROOT) // 36).to(device)
     jw = jw / jw.mean()
     if first:
         net.load_state_dict(first["net"])
     else:
         start_from_principal(net, (every - mean) / std, weights)
         del every
-    loop = common.Loop(team, net, args.out, args.minutes, args.lr, resume=args.resume, size=size, mean=mean, std=std)
+    loop = Loop(team, net, args, size=size, mean=mean.cpu(), std=std.cpu())
     torch.manual_seed(1)
-    check = ((held if held.items else train).sample(32, frames) - mean) / std
+    check = ((held if held.size else train).sample(32, frames) - mean) / std
     measure = lambda net: evaluate(net, check, mean, std)
-    team.seed(2 + loop.step)
     scale = {"kl": args.kl, "velocity": args.smooth, "acceleration": args.smooth}
 
     def forward(x):
-        with torch.autocast("cpu", torch.bfloat16):
-            y, mu, logvar = net(x)
+        with mixed(device):
+            y, mu, logvar = net(x, rough=args.rough)
         parts = losses(x, y, mean, std, mu, logvar, weights, jw)
         return sum(scale.get(k, 1.0) * v for k, v in parts.items()), parts
 
@@ -165,7 +154,7 @@ def main():
         with torch.no_grad():
             net(check[:2])  # makes the tables
         forward = torch.compile(forward, dynamic=False)
-    while loop.progress < 1:
+    for _ in loop:
         loss, parts = forward((train.sample(args.batch, frames) - mean) / std)
         loop.update(loss, **parts)
         loop.report(100, measure, 200)

@@ -1,13 +1,15 @@
 """Windows of the cache as training batches for the flow: latents and conditioning, with modality dropout."""
-import math
-
 import torch
 import torch.nn.functional as F
 
-from ..nets.flow import GAZE, USER, Condition
+from ..nets.flow import GAZE, Condition
+from . import common
+from .common import mixed
+from .data import Split
 from .geometry import to_local
 
 CONTEXT = 8  # frames that an audio encoder in training hears before a window: a quarter of a second, more than it looks back
+SMOOTH = (1, 30, 60, 120)  # frames over which the gaze score is averaged; drawn as often as the window's mean
 
 
 def smooth(gaze, window):
@@ -19,74 +21,93 @@ def smooth(gaze, window):
     return F.avg_pool1d(padded, window, 1)[0, 0]
 
 
-def block_users(roots, user, first, blocks):
-    """Positions [blocks, 8] of block k - 1 in the agent's frame at the last frame of block k - 1; block 0 starts at frame `first` >= 4."""
-    at = torch.arange(first - 4, first - 4 + 4 * blocks).reshape(blocks, 4)
-    return to_local(roots[at[:, -1]], user[at][..., [0, 2]].double()).float()
-
-
 class Windows:
-    """Random windows of `blocks` blocks. With `audio`, an encoder in training, the first `live` windows of a batch (or all) take their features
-    from the voices (cache made with --waves), with gradients; the others take the cached ones."""
+    """Random windows of `blocks` blocks from a cache file, on `device`. With `audio`, an encoder in training, the first `live` windows of a batch
+    (or all) take their features from `voices` [N, 2, 800] i16, with gradients; the others take the cached ones."""
 
-    def __init__(self, cache, blocks, drop=0.05, drop_all=0.1, drop_gaze=0.35, prefix=0.1, jitter=True, audio=None, live=None):
-        state = torch.load(cache, weights_only=False, mmap=True)
-        self.items = [i for i in state["items"] if len(i["z"][-1]) >= blocks]
-        self.mean, self.std, self.blocks = state["latent_mean"], state["latent_std"], blocks
+    def __init__(self, cache, blocks, drop=0.05, drop_all=0.1, drop_gaze=0.35, prefix=0.1, jitter=True, device="cpu", audio=None, voices=None, live=None):
+        state = common.load(cache, mmap=True)
+        self.blocks, self.device = blocks, torch.device(device)
         self.drop, self.drop_all, self.drop_gaze, self.prefix, self.jitter = drop, drop_all, drop_gaze, prefix, jitter
-        self.weights = torch.tensor([float(len(i["z"][0])) for i in self.items])
-        self.audio, self.live = audio, live
+        self.audio, self.live, self.voices = audio, live, voices
+        for name in ("z", "roots", "user", "agent", "voice", "still"):
+            setattr(self, name, state[name].to(self.device))
+        self.mean, self.std, self.starts, self.has = state["latent_mean"], state["latent_std"], state["starts"], state["has"].float()
+        self.segments = state["segments"][state["segments"][:, 3] >= blocks]
+        if not len(self.segments):
+            raise SystemExit(f"{cache} has no clip of {blocks} blocks ({blocks * 4 / 30:.1f} s)")
+        self.weights = self.segments[:, 3].float()
+        spans = list(zip(self.starts[:-1].tolist(), self.starts[1:].tolist()))
+        self.gaze = torch.stack([torch.cat([smooth(state["gaze"][a:b], w) for a, b in spans]) for w in SMOOTH]).to(self.device)
 
-    def place(self, i):
-        """A clip, one of its phases, and a block of it to begin at."""
-        item = self.items[i]
-        phase = int(torch.randint(0, len(item["phases"]), (1,)))
-        return item, phase, int(torch.randint(0, len(item["z"][phase]) - self.blocks + 1, (1,)))
+    @property
+    def audio_features(self):
+        return self.agent.shape[1]
 
-    def cut(self, item, phase, at, n):
-        first = item["phases"][phase] + 4 * at
-        z = item["z"][phase][at:at + n]
-        user = block_users(item["roots"], item["user"], first, n)
-        frames = slice(first, first + 4 * n)
-        agent = item["agent"][frames].float().reshape(n, -1)
-        voice = item["voice"][first - 4:first - 4 + 4 * n].float().reshape(n, -1)
-        kind = int(torch.randint(0, 8, (1,))) if self.jitter else 2
-        gaze = item["gaze"][frames].mean().expand(4 * n) if kind > 3 else smooth(item["gaze"], (1, 30, 60, 120)[kind])[frames]
-        flags = torch.tensor([1.0, *map(float, item["has"]), 1.0])
-        return z, user, agent, voice, gaze.reshape(n, 4), flags
+    def draw(self, size):
+        """Places of `size` windows: rows of `segments` and their first blocks, on the CPU."""
+        segment = self.segments[torch.multinomial(self.weights, size, replacement=True)]
+        at = (torch.rand(size, dtype=torch.float64) * (segment[:, 3] - self.blocks + 1)).long()
+        return segment, at
 
-    def hear(self, places):
+    def frames(self, segment, at):
+        """Frames [B, 4 + 4 K] of the windows, beginning with the block before them."""
+        return ((segment[:, 1] + 4 * at)[:, None] + torch.arange(-4, 4 * self.blocks)).to(self.device)
+
+    def read(self, segment, at):
+        """Latents [B, K, Dz] and all that is known beside them; block k's user is seen in block k - 1, from that block's last frame."""
+        n, b, frames = self.blocks, len(at), self.frames(segment, at)
+        z = self.z[((segment[:, 2] + at)[:, None] + torch.arange(n)).to(self.device)]
+        before, now = frames[:, :-4], frames[:, 4:]
+        user = to_local(self.roots[before[:, 3::4]], self.user[before][..., [0, 2]].double().unflatten(1, (n, 4))).float()
+        kind = torch.randint(0, 2 * len(SMOOTH), (b,)) if self.jitter else torch.full((b,), 2)
+        kind = kind.to(self.device)[:, None]
+        gaze = torch.where(kind >= len(SMOOTH), self.gaze[0][now].mean(1, keepdim=True), self.gaze[kind % len(SMOOTH), now])
+        flags = torch.ones(b, n, 4, device=self.device)
+        flags[..., 1:3] = self.has[segment[:, 0]].to(self.device)[:, None]
+        together = lambda x: x.float().reshape(b, n, -1)
+        return z, Condition(user.flatten(2), together(self.agent[now]), together(self.voice[before]), gaze.reshape(b, n, 4), flags)
+
+    def stillness(self, segment, at):
+        """Share of each block's frames [B, K] in which both hands are still."""
+        return self.still[self.frames(segment, at)[:, 4:]].float().unflatten(1, (self.blocks, 4)).mean(-1)
+
+    def hear(self, segment, at):
         """Agent's and user's features [B, K, 4 D_a] each, straight from the voices."""
-        frames = 4 * self.blocks
-        waves = torch.zeros(2, len(places), 800 * (CONTEXT + frames))
-        for row, (item, phase, at) in enumerate(places):
-            for who, wave in enumerate(item["waves"]):
-                start = item["phases"][phase] + 4 * at - 4 * who
-                if wave is not None:
-                    part = wave[800 * max(0, start - CONTEXT):800 * (start + frames)]
-                    waves[who, row, -len(part):] = part.float() / 32768
-        with torch.autocast("cpu", torch.bfloat16):
-            heard = self.audio(waves.flatten(0, 1))[:, CONTEXT:].float().reshape(2, len(places), self.blocks, -1)
-        return heard * torch.tensor([place[0]["has"] for place in places]).T[..., None, None]
+        frames, first = self.frames(segment, at), self.starts[segment[:, 0]].to(self.device)[:, None]
+        earlier = frames[:, :1] - torch.arange(CONTEXT, 0, -1, device=self.device)
+        every = torch.cat([earlier, frames], 1)
+        kept = (every >= first)[..., None]
+        both = self.voices[every.clamp(min=0).to(self.voices.device)].to(self.device)
+        waves = torch.stack([(both[:, 4:, 0] * kept[:, 4:]), (both[:, :-4, 1] * kept[:, :-4])]).float() / 32768
+        with mixed(self.device):
+            heard = self.audio(waves.flatten(2).flatten(0, 1))[:, CONTEXT:].float().reshape(2, len(at), self.blocks, -1)
+        return heard * self.has[segment[:, 0]].to(self.device).T[..., None, None]
 
-    def batch(self, size):
-        """Latents [B, K, Dz] and their Condition with some modalities dropped."""
-        places = [self.place(i) for i in torch.multinomial(self.weights, size, replacement=True).tolist()]
-        z, user, agent, voice, gaze, flags = (torch.stack(c) for c in zip(*[self.cut(*p, self.blocks) for p in places]))
+    def batch(self, size, place=None):
+        """Latents [B, K, Dz] and their Condition with some modalities dropped; at places drawn here, or at `place`."""
+        place = place or self.draw(size)
+        z, cond = self.read(*place)
+        user, agent, voice = cond.user, cond.agent, cond.voice
         if self.audio is not None:
             live = min(self.live or size, size)
-            heard = self.hear(places[:live])
+            heard = self.hear(*(p[:live] for p in place))
             agent, voice = torch.cat([heard[0], agent[live:]]), torch.cat([heard[1], voice[live:]])
-        n = self.blocks
+        n, device = self.blocks, self.device
         if self.jitter:
-            turn = (torch.randn(size, 1, 1) * 0.02 + torch.randn(size, n, 1) * 0.02)
-            shift = torch.randn(size, 1, 1, 2) * 0.02 + torch.randn(size, n, 1, 2) * 0.01
-            c, s = turn.cos(), turn.sin()
-            user = torch.stack([c * user[..., 0] + s * user[..., 1], c * user[..., 1] - s * user[..., 0]], -1) + shift
-        flags = flags[:, None].repeat(1, n, 1)
+            normal = lambda *shape: torch.randn(*shape, device=device)
+            turn = normal(size, 1, 1) * 0.02 + normal(size, n, 1) * 0.02
+            shift = normal(size, 1, 1, 2) * 0.02 + normal(size, n, 1, 2) * 0.01
+            c, s, user = turn.cos(), turn.sin(), user.unflatten(2, (4, 2))
+            user = (torch.stack([c * user[..., 0] + s * user[..., 1], c * user[..., 1] - s * user[..., 0]], -1) + shift).flatten(2)
         keep = (torch.rand(size, 1, 4) >= self.drop).float()
         keep[..., GAZE] = (torch.rand(size, 1) >= self.drop_gaze).float()
         keep = keep * (torch.rand(size, 1, 1) >= self.drop_all).float()
         start = torch.where(torch.rand(size, 1) < self.prefix, torch.randint(1, n, (size, 1)), torch.zeros(size, 1, dtype=torch.long))
         keep = keep * (torch.arange(n)[None] >= start).float()[..., None]
-        return z, Condition(user.flatten(2), agent, voice, gaze, flags * keep)
+        return z, Condition(user, agent, voice, cond.gaze, cond.flags * keep.to(device))
+
+
+def voices_of(corpus, split, device="cpu", workers=1):
+    """All voices of a split [N, 2, 800] i16: 6.9 GB for 20 hours, on the CPU mapped from a file that is made when first asked for."""
+    return Split(corpus, split, voices=True, workers=workers).voices.to(device)

@@ -1,4 +1,5 @@
-//! What the Rust workers share: the protocol of a worker, and for peers the streaming session around a network.
+//! What the Rust workers share: the protocol of a worker, and for peers the streaming session
+//! around a network.
 
 pub mod session;
 pub mod worker;

@@ -1,4 +1,5 @@
-//! The streaming session around a network with explicit caches, as peers/stream.py is: rings, phases, masks, the midpoint rule.
+//! The streaming session around a network with explicit caches, as peers/stream.py is: rings,
+//! phases, masks, the midpoint rule.
 
 use crate::Result;
 use crate::worker::Blocks;
@@ -89,10 +90,11 @@ pub struct Context {
     pub bias: Vec<f32>,
 }
 
-/// The two networks of a peer, which keep the rings: `flow` one ring a slot, `decoder` one.
+/// The two networks of a peer, which keep the rings: `flow` one ring per slot, `decoder` one.
 pub trait Networks {
-    /// One evaluation at `slot`: `z` `[2, latent]`, `cond` `[2, 2, width]` (branch, row). Leaves x1 `[2, latent]` in `x1` and writes the finished
-    /// token's keys and values to place `at` of the slot's rings.
+    /// One evaluation at `slot`: `z` `[2, latent]`, `cond` `[2, 2, width]` (branch, row). Leaves x1
+    /// `[2, latent]` in `x1` and writes the finished token's keys and values to place `at` of the
+    /// slot's rings.
     fn flow(
         &mut self,
         slot: usize,
@@ -102,7 +104,8 @@ pub trait Networks {
         at: usize,
         x1: &mut [f32],
     ) -> Result<()>;
-    /// One block: `z` `[latent]`, five new tokens to places `at ..` of the ring; frames `[4, features]`.
+    /// One block: `z` `[latent]`, five new tokens to places `at ..` of the ring; frames `[4,
+    /// features]`.
     fn decoder(&mut self, z: &[f32], context: &Context, at: usize, frames: &mut [f32]) -> Result<()>;
 }
 

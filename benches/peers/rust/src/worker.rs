@@ -1,5 +1,6 @@
-//! A worker: one line of JSON in, one out. `{"time": N}` runs N blocks and answers `{"ms": [..]}`; `{"check": "FILE"}` runs the prepared
-//! blocks from the start and writes what came out. Between lines a worker does nothing.
+//! A worker: one line of JSON in, one out. `{"time": N}` runs N blocks and answers `{"ms": [..]}`;
+//! `{"check": "FILE"}` runs the prepared blocks from the start and writes what came out. Between
+//! lines a worker does nothing.
 
 use crate::Result;
 use serde_json::{Value, json};

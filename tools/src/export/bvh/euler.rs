@@ -10,9 +10,10 @@ pub(super) struct Angles([f64; 3]);
 impl Angles {
     /// The angles of `q` nearest to those before.
     ///
-    /// A rotation has two triples up to full turns, `(z, x, y)` and `(z + pi, pi - x, y + pi)`; the nearer one is taken, so
-    /// that `x` may pass a quarter turn. There (`cos x = 0`) only `z + y` or `z - y` is determined: `z` stays as it was. In
-    /// every case `x` and `y` are read from `Rz(z)^T R`, so the triple gives `R` back, however close to that point.
+    /// A rotation has two triples up to full turns, `(z, x, y)` and `(z + pi, pi - x, y + pi)`; the
+    /// nearer one is taken, so that `x` may pass a quarter turn. There (`cos x = 0`) only `z + y`
+    /// or `z - y` is determined: `z` stays as it was. In every case `x` and `y` are read from
+    /// `Rz(z)^T R`, so the triple gives `R` back, however close to that point.
     pub(super) fn follow(&mut self, q: Quat) -> [f64; 3] {
         let r = DMat3::from_quat(q.as_dquat().normalize());
         let (r01, r11) = (r.y_axis.x, r.y_axis.y);
@@ -29,7 +30,8 @@ impl Angles {
 /// The triple with this `z`, where `R = Rz(z) Rx Ry`.
 fn solve(r: &DMat3, z: f64) -> [f64; 3] {
     let m = DMat3::from_rotation_z(-z) * *r;
-    // Rx Ry = [[cy, 0, sy], [sx sy, cx, -sx cy], [-cx sy, sx, cx cy]]; columns are x_axis, y_axis, z_axis.
+    // Rx Ry = [[cy, 0, sy], [sx sy, cx, -sx cy], [-cx sy, sx, cx cy]]; columns are x_axis, y_axis,
+    // z_axis.
     [z, m.y_axis.z.atan2(m.y_axis.y), m.z_axis.x.atan2(m.x_axis.x)]
 }
 
@@ -73,7 +75,8 @@ mod tests {
 
     #[test]
     fn goes_through_a_quarter_turn_without_a_jump() {
-        // A knee bends to 137 degrees and back; a slight twist makes `z` swing near 90 degrees, but not over and not for good.
+        // A knee bends to 137 degrees and back; a slight twist makes `z` swing near 90 degrees, but
+        // not over and not for good.
         for (twist, most) in [(0.0, 0.1), (0.001, 1.6)] {
             let mut angles = Angles::default();
             for i in 0..200 {

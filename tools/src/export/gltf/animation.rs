@@ -9,8 +9,8 @@ use gltf_json::animation::{Channel, Interpolation, Property, Sampler, Target};
 use gltf_json::{Accessor, Animation, Index, Node};
 use visavis::FPS;
 
-/// Adds the animation `motion`: translation of the hips, rotation of every joint, and of `user` translation and, where
-/// positions are missing, scale (0 while unknown).
+/// Adds the animation `motion`: translation of the hips, rotation of every joint, and of `user`
+/// translation and, where positions are missing, scale (0 while unknown).
 pub(in crate::export) fn animate(
     builder: &mut Builder,
     recording: &Recording,

@@ -29,7 +29,8 @@ pub(super) struct Body {
 }
 
 impl Body {
-    /// Builds the body: arms, legs, trunk and head from the humanoid names, a thin bone for joints of other names.
+    /// Builds the body: arms, legs, trunk and head from the humanoid names, a thin bone for joints
+    /// of other names.
     pub(super) fn of(rig: &Rig) -> Self {
         let mut rest: Vec<Vec3> = Vec::with_capacity(rig.len());
         for (j, joint) in rig.joints.iter().enumerate() {
@@ -102,7 +103,8 @@ impl Body {
         self.cone(SKIN, j, nose + Vec3::Y * 0.02 * unit, nose, [0.010, 0.016], Vec3::ONE);
     }
 
-    /// Radii are those of the reference body and scaled to this one; points are in the frame of joint `j`.
+    /// Radii are those of the reference body and scaled to this one; points are in the frame of
+    /// joint `j`.
     fn cone(&mut self, part: usize, j: usize, a: Vec3, b: Vec3, radii: [f32; 2], stretch: Vec3) {
         let Ok(joint) = u8::try_from(j) else { return };
         let at = self.rest[j];

@@ -92,7 +92,8 @@ impl Builder {
         }
     }
 
-    /// An accessor over rows of floats in a view of its own, with their bounds where the format asks for them.
+    /// An accessor over rows of floats in a view of its own, with their bounds where the format
+    /// asks for them.
     pub(super) fn floats<const N: usize>(
         &mut self,
         rows: &[[f32; N]],
@@ -157,7 +158,8 @@ impl Builder {
         self.bytes.resize(length, fill);
     }
 
-    /// The file: a 12-byte header, the JSON chunk (padded with spaces) and the BIN chunk (padded with zeros).
+    /// The file: a 12-byte header, the JSON chunk (padded with spaces) and the BIN chunk (padded
+    /// with zeros).
     pub(in crate::export) fn finish(mut self) -> Result<Vec<u8>> {
         self.root.push(gltf_json::Buffer {
             byte_length: USize64::from(self.bytes.len()),

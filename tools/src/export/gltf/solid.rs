@@ -8,7 +8,8 @@ const AROUND: usize = 16;
 /// Rings of a hemisphere, its pole not counted.
 const RINGS: usize = 4;
 
-/// A triangle mesh whose vertices each belong to one joint: metres, counter-clockwise outside, in the rest pose.
+/// A triangle mesh whose vertices each belong to one joint: metres, counter-clockwise outside, in
+/// the rest pose.
 #[derive(Debug, Default)]
 pub(super) struct Solid {
     pub(super) positions: Vec<[f32; 3]>,
@@ -18,13 +19,15 @@ pub(super) struct Solid {
 }
 
 impl Solid {
-    /// Adds two half balls, at `a` and `b` with these radii, and the cone between them, stretched by `stretch` (a factor an axis) about the line
-    /// from `a` to `b`; where both are one point, it is a ball.
+    /// Adds two half balls, at `a` and `b` with these radii, and the cone between them, stretched
+    /// by `stretch` (a factor an axis) about the line from `a` to `b`; where both are one point, it
+    /// is a ball.
     pub(super) fn cone(&mut self, joint: u8, a: Vec3, b: Vec3, radii: [f32; 2], stretch: Vec3) {
         let axis = (b - a).normalize_or(Vec3::Y);
         let (side, front) = axis.any_orthonormal_pair();
         let first = self.positions.len();
-        // From the ring above the pole of `a` to its equator, then from the equator of `b` to the ring below its pole.
+        // From the ring above the pole of `a` to its equator, then from the equator of `b` to the
+        // ring below its pole.
         for ring in 0..2 * RINGS {
             let (centre, radius, steps) = match ring.checked_sub(RINGS) {
                 None => (a, radii[0], ring as f32 + 1.0 - RINGS as f32),

@@ -1,4 +1,5 @@
-//! The recording as JSON for the page: small things as they are, tracks as base64 of little-endian numbers.
+//! The recording as JSON for the page: small things as they are, tracks as base64 of little-endian
+//! numbers.
 
 use super::Meta;
 use crate::metrics::foot_clearances;
@@ -7,7 +8,8 @@ use glam::{Quat, Vec3};
 use serde_json::{Value, json};
 use visavis::{BLOCK_FRAMES, FPS, Frame, SAMPLE_RATE, Sampler};
 
-/// Decoded joint positions are stored relative to the root in steps of this, metres: +-6.5 m in 16 bits.
+/// Decoded joint positions are stored relative to the root in steps of this, metres: +-6.5 m in 16
+/// bits.
 const STEP: f32 = 0.0002;
 /// A foot nearer to the floor than this is marked as touching it, metres.
 const TOUCH: f64 = 0.03;
@@ -92,7 +94,8 @@ fn voice(samples: Option<&[f32]>) -> Value {
         .map_or(Value::Null, |samples| shorts(halved(samples).into_iter().map(|x| (x * 32767.0).round() as i16)).into())
 }
 
-/// Every second sample after a 31-tap half-band low-pass (Hann-windowed sinc, centred, so without delay).
+/// Every second sample after a 31-tap half-band low-pass (Hann-windowed sinc, centred, so without
+/// delay).
 fn halved(samples: &[f32]) -> Vec<f32> {
     const REACH: i64 = 15;
     let tap = |k: i64| {

@@ -1,11 +1,12 @@
 //! The viewer: one self-contained HTML file that plays a recording.
 //!
-//! The page (`page/`: markup, style, scripts by job) is compiled in; [`render`] joins it with the recording's data. The file
-//! needs no network and no library, opens from disk, and forbids itself any connection (Content-Security-Policy). Without
-//! WebGL 2 it draws on a 2-D canvas. Options after `#` in its address, joined by `&`, make views repeatable:
-//! `t=12.3` (seconds), `play`, `speed=0.5`, `cam=yaw,pitch,distance[,height]` (degrees, degrees, metres, metres; yaw 0 stands on the +Z
-//! side, where a session's agent looks),
-//! `view=user`, `follow=0`, `loop=0`, `theme=dark|light`, `joints`, `clean` (no panels), `fallback` (2-D canvas).
+//! The page (`page/`: markup, style, scripts by job) is compiled in; [`render`] joins it with the
+//! recording's data. The file needs no network and no library, opens from disk, and forbids itself
+//! any connection (Content-Security-Policy). Without WebGL 2 it draws on a 2-D canvas. Options
+//! after `#` in its address, joined by `&`, make views repeatable: `t=12.3` (seconds), `play`,
+//! `speed=0.5`, `cam=yaw,pitch,distance[,height]` (degrees, degrees, metres, metres; yaw 0 stands
+//! on the +Z side, where a session's agent looks), `view=user`, `follow=0`, `loop=0`,
+//! `theme=dark|light`, `joints`, `clean` (no panels), `fallback` (2-D canvas).
 
 mod data;
 
@@ -21,7 +22,8 @@ pub struct Meta {
     pub title: String,
     /// One line under the title, plain text; may be empty.
     pub subtitle: String,
-    /// Facts for the "about" panel as (name, value), plain text: model, sampler, seed, kernels, licence and so on.
+    /// Facts for the "about" panel as (name, value), plain text: model, sampler, seed, kernels,
+    /// licence and so on.
     pub facts: Vec<(String, String)>,
 }
 
@@ -47,7 +49,8 @@ const SCRIPTS: [&str; 14] = [
 
 /// The page for a recording: UTF-8 HTML, to be written to a file as it is.
 ///
-/// Motion takes about 0.4 kB a frame and each voice 32 kB a second (16 bit at 12 kHz, base64): under 3 MB for half a minute.
+/// Motion takes about 0.4 kB per frame and each voice 32 kB per second (16 bit at 12 kHz, base64):
+/// under 3 MB for half a minute.
 pub fn render(recording: &Recording, meta: &Meta) -> String {
     let script = format!("(() => {{\n\"use strict\";\n{}\n}})();", SCRIPTS.join("\n"));
     let data = data::json(recording, meta);
@@ -58,7 +61,8 @@ pub fn render(recording: &Recording, meta: &Meta) -> String {
 /// Writes [`render`]'s page to `path`; the file appears whole or not at all.
 ///
 /// # Errors
-/// Those of [`write_atomically`]: [`Io`](visavis::ErrorKind::Io) naming `path` when it cannot be written.
+/// Those of [`write_atomically`]: [`Io`](visavis::ErrorKind::Io) naming `path` when it cannot be
+/// written.
 pub fn write(path: impl AsRef<Path>, recording: &Recording, meta: &Meta) -> Result<()> {
     write_atomically(path, |out| out.write_all(render(recording, meta).as_bytes()))
 }

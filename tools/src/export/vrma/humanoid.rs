@@ -1,8 +1,10 @@
-//! The bones of the VRM 1.0 humanoid, as far as a body has them (no eyes, jaw or fingers): name, parent, required.
+//! The bones of the VRM 1.0 humanoid, as far as a body has them (no eyes, jaw or fingers): name,
+//! parent, required.
 
 use visavis::Rig;
 
-/// Bones with the nearest bone that must be above them; an optional bone that is missing is skipped on the way up.
+/// Bones with the nearest bone that must be above them; an optional bone that is missing is skipped
+/// on the way up.
 const BONES: [(&str, &str, bool); 22] = [
     ("hips", "", true),
     ("spine", "hips", true),
@@ -37,7 +39,8 @@ fn bone(name: &str) -> Option<&'static (&'static str, &'static str, bool)> {
     BONES.iter().find(|b| b.0 == name)
 }
 
-/// Checks required bones and that each bone's nearest bone above is the one that the humanoid has there.
+/// Checks required bones and that each bone's nearest bone above is the one that the humanoid has
+/// there.
 pub(super) fn check(rig: &Rig) -> Result<(), String> {
     for &(name, parent, required) in &BONES {
         match rig.index(name) {

@@ -23,7 +23,13 @@ final class Conversation {
     static void push(VisavisSession session, int seconds, int rate) {
         session.pushAgentAudio(voice(rate, seconds * rate, 120, 0), rate);
         session.pushUserAudio(voice(rate, seconds * rate, 190, 1), rate);
-        for (int i = 0; i < 60 * seconds; i++) {
+        walk(session, 0, 60 * seconds);
+        walk(session, 1, 60 * seconds);
+    }
+
+    /** Every second position of the first {@code count} of that walk, from {@code first} on. */
+    static void walk(VisavisSession session, int first, int count) {
+        for (int i = first; i < count; i += 2) {
             float x = (Math.abs(i % 240 - 120) - 60) / 60f;
             session.pushUserHead(x, 1.65f, 1.5f, i * 16_666_667L);
         }

@@ -5,7 +5,7 @@ import static org.visavis.Check.engine;
 import static org.visavis.Check.equal;
 import static org.visavis.Check.isTrue;
 
-import android.content.res.AssetManager;
+import android.content.res.StandInAssets;
 import java.io.File;
 import java.io.OutputStream;
 import java.nio.ByteBuffer;
@@ -40,13 +40,13 @@ final class EngineTest {
                 out.write(bytes);
                 out.write(new byte[50]);
             }
-            try (VisavisEngine engine = VisavisEngine.fromAsset(new AssetManager(apk, 4099, bytes.length), "model.safetensors")) {
+            try (VisavisEngine engine = VisavisEngine.fromAsset(StandInAssets.inside(apk, 4099, bytes.length), "model.safetensors")) {
                 isTrue(engine.skeleton().size() > 0, "joints");
             }
             Check.throwsWith(BundleException.Corrupt.class, "bundle asset",
-                    () -> VisavisEngine.fromAsset(new AssetManager(apk, 4098, bytes.length), "model.safetensors"));
+                    () -> VisavisEngine.fromAsset(StandInAssets.inside(apk, 4098, bytes.length), "model.safetensors"));
             Check.throwsWith(IllegalArgumentException.class, "the file has",
-                    () -> VisavisEngine.fromAsset(new AssetManager(apk, 4099, bytes.length + 51), "model.safetensors"));
+                    () -> VisavisEngine.fromAsset(StandInAssets.inside(apk, 4099, bytes.length + 51), "model.safetensors"));
         } finally {
             isTrue(apk.delete(), "temporary file");
         }

@@ -50,7 +50,7 @@ final class ErrorTest {
     static void testValues() throws Exception {
         try (VisavisEngine engine = engine();
                 VisavisSession session = engine.newSession()) {
-            throwsWith(ARGUMENT, "not a finite number", () -> session.pushUserAudio(new float[] {0, Float.NaN}, 0, 2, 24_000));
+            throwsWith(ARGUMENT, "1 of 2 pushed samples", () -> session.pushUserAudio(new float[] {0, Float.NaN}, 0, 2, 24_000));
             throwsWith(ARGUMENT, "negative", () -> session.pushUserAudio(new float[2], 0, 2, -24_000));
             throwsWith(ARGUMENT, "7999", () -> session.pushUserAudio(new float[2], 0, 2, 7_999));
             throwsWith(ARGUMENT, "gaze", () -> session.setGaze(1.5f));

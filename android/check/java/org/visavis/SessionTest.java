@@ -140,8 +140,11 @@ final class SessionTest {
             equal(10L, stats.agentVoice.clippedSamples);
             equal(2L * 3200 - 100, stats.userVoice.underrunSamples);
             equal(0L, stats.agentVoice.underrunSamples);
+            equal(0L, stats.agentVoice.nonFiniteSamples + stats.agentVoice.badRateSamples + stats.agentVoice.contendedSamples);
             session.clearAgentAudio();
             session.finishAgentAudio();
+            session.clearUserAudio();
+            session.finishUserAudio();
             session.setAgentAudioPresent(false);
             session.setUserAudioPresent(true);
             equal(4, session.poll(session.nextDueNanos(), out, 0));

@@ -3,9 +3,12 @@ package org.visavis;
 import static org.visavis.Check.engine;
 import static org.visavis.Check.isTrue;
 
+import java.nio.FloatBuffer;
 import java.util.ArrayList;
 import java.util.Arrays;
 import java.util.List;
+import java.util.concurrent.CountDownLatch;
+import java.util.concurrent.atomic.AtomicBoolean;
 import java.util.concurrent.atomic.AtomicReference;
 
 /** Threads. */
@@ -98,6 +101,75 @@ final class ThreadTest {
                 session.close();
             });
             together(actions);
+        }
+    }
+
+    /** While one thread has the session for long, others push and set, from one buffer too, and are through long before. */
+    static void testNobodyWaitsForABlock() throws Exception {
+        try (VisavisEngine engine = engine();
+                VisavisSession session = engine.newSession()) {
+            long before = System.nanoTime();
+            session.warmUp(20);
+            // Five seconds of blocks in one call.
+            int blocks = (int) Math.max(100, 20 * 5_000_000_000L / (System.nanoTime() - before));
+            AtomicBoolean over = new AtomicBoolean();
+            CountDownLatch inside = new CountDownLatch(1);
+            FloatBuffer sound = Check.direct(480);
+            List<Check.Action> actions = new ArrayList<>();
+            actions.add(() -> {
+                inside.countDown();
+                session.warmUp(blocks);
+                over.set(true);
+            });
+            for (int t = 0; t < 2; t++) {
+                int thread = t;
+                actions.add(() -> {
+                    inside.await();
+                    Thread.sleep(200);
+                    for (int i = 0; i < 200; i++) {
+                        session.pushAgentAudio(sound, 48_000);
+                        session.pushUserAudio(sound, 48_000);
+                        session.pushUserHead(0, 1.6f, 1.5f, i * 2_000_000L + thread);
+                        session.setGaze(0.5f);
+                        session.setGuidance(1.3f, 2);
+                        session.setBudget(0);
+                        session.setUserAudioPresent(true);
+                    }
+                    isTrue(!over.get(), "pushes while another thread is inside the session");
+                });
+            }
+            together(actions);
+        }
+    }
+
+    /** Threads push their part of the inputs, one of them in pieces: the motion is that of one thread. */
+    static void testWhoPushesDoesNotMatter() throws Exception {
+        try (VisavisEngine engine = engine();
+                VisavisSession one = engine.newSession();
+                VisavisSession several = engine.newSession()) {
+            Conversation.push(one, 1, 44_100);
+            FloatBuffer agent = Conversation.voice(44_100, 44_100, 120, 0);
+            FloatBuffer user = Conversation.voice(44_100, 44_100, 190, 1);
+            together(Arrays.asList(
+                    () -> {
+                        for (int from = 0; from < 44_100; from += 441) {
+                            FloatBuffer piece = agent.duplicate();
+                            piece.position(from).limit(from + 441);
+                            several.pushAgentAudio(piece, 44_100);
+                        }
+                    },
+                    () -> several.pushUserAudio(user, 44_100),
+                    () -> Conversation.walk(several, 0, 60),
+                    () -> Conversation.walk(several, 1, 60)));
+            float[] a = new float[one.layout().blockFloats()];
+            float[] b = new float[a.length];
+            for (int k = 0; k < BLOCKS; k++) {
+                long due = one.nextDueNanos();
+                one.poll(due, a, 0);
+                several.poll(due, b, 0);
+                isTrue(Arrays.equals(a, b), "block " + k);
+            }
+            isTrue(several.stats().headAccepted == 60, "heads");
         }
     }
 }

@@ -4,10 +4,11 @@ public final class AudioAttributes {
     public static final int USAGE_MEDIA = 1;
     public static final int CONTENT_TYPE_SPEECH = 1;
 
-    private AudioAttributes() {
-    }
+    private AudioAttributes() {}
 
     public static class Builder {
+        public Builder() {}
+
         public Builder setUsage(int usage) {
             return this;
         }

@@ -4,11 +4,17 @@ public final class AudioFormat {
     public static final int CHANNEL_OUT_MONO = 4;
     public static final int ENCODING_PCM_FLOAT = 4;
 
-    private AudioFormat() {
-    }
+    int rate;
+
+    private AudioFormat() {}
 
     public static class Builder {
+        private final AudioFormat format = new AudioFormat();
+
+        public Builder() {}
+
         public Builder setSampleRate(int sampleRate) {
+            format.rate = sampleRate;
             return this;
         }
 
@@ -21,7 +27,7 @@ public final class AudioFormat {
         }
 
         public AudioFormat build() {
-            return new AudioFormat();
+            return format;
         }
     }
 }

@@ -3,7 +3,7 @@ package android.os;
 public class ParcelFileDescriptor {
     private final int fd;
 
-    public ParcelFileDescriptor(int fd) {
+    ParcelFileDescriptor(int fd) {
         this.fd = fd;
     }
 

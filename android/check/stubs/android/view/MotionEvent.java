@@ -1,11 +1,29 @@
 package android.view;
 
 public final class MotionEvent {
+    public static final int ACTION_DOWN = 0;
+    public static final int ACTION_UP = 1;
+    public static final int ACTION_MOVE = 2;
+
+    private final int action;
+    private final float x;
+    private final float y;
+
+    MotionEvent(int action, float x, float y) {
+        this.action = action;
+        this.x = x;
+        this.y = y;
+    }
+
+    public int getActionMasked() {
+        return action;
+    }
+
     public float getX() {
-        return 0;
+        return x;
     }
 
     public float getY() {
-        return 0;
+        return y;
     }
 }

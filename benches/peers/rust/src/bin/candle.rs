@@ -1,6 +1,7 @@
 //! candle: the same network written on its tensors, linear layers as QMatMul: f32, Q8_0 or Q4_0.
 //!
-//! `candle FOLDER candle-f32|candle-q8|candle-q4 THREADS`; the threads are rayon's (RAYON_NUM_THREADS).
+//! `candle FOLDER candle-f32|candle-q8|candle-q4 THREADS`; the threads are rayon's
+//! (RAYON_NUM_THREADS).
 
 use candle_core::quantized::{GgmlDType, QMatMul, QTensor};
 use candle_core::{D, DType, Device, Module, Tensor};

@@ -87,7 +87,8 @@ fn count(bundle: &str, sampler: Sampler, blocks: usize) -> Result<()> {
     Ok(())
 }
 
-/// `numbers`: threads, sessions, whether there is a gaze target, blocks before any is timed, blocks that are.
+/// `numbers`: threads, sessions, whether there is a gaze target, blocks before any is timed, blocks
+/// that are.
 fn grow(bundle: &str, numbers: &[usize]) -> Result<()> {
     let [threads, sessions, gaze, warm, blocks] = numbers else { return Err("five numbers".into()) };
     let engine = Engine::load(bundle)?;

@@ -1,4 +1,5 @@
-//! tract: the exported ONNX files, optimised, f32. `tract FOLDER tract-f32 THREADS`: matrix products on rayon's threads where there are two.
+//! tract: the exported ONNX files, optimised, f32. `tract FOLDER tract-f32 THREADS`: matrix
+//! products on rayon's threads where there are two.
 
 use std::sync::Arc;
 use tract_onnx::prelude::*;
@@ -37,7 +38,8 @@ struct Nets {
     ring: Ring,
 }
 
-/// Keys `[branches, heads, head_dim, past]`, then values `[branches, heads, past, head_dim]`, of each layer. Runs only borrow them.
+/// Keys `[branches, heads, head_dim, past]`, then values `[branches, heads, past, head_dim]`, of
+/// each layer. Runs only borrow them.
 struct Ring {
     stack: Stack,
     branches: usize,

@@ -1,7 +1,9 @@
 package android.content.res;
 
 import android.os.ParcelFileDescriptor;
+import android.os.StandInServices;
 import java.io.Closeable;
+import java.io.FileInputStream;
 import java.io.IOException;
 import java.io.RandomAccessFile;
 
@@ -19,7 +21,7 @@ public class AssetFileDescriptor implements Closeable {
     }
 
     public ParcelFileDescriptor getParcelFileDescriptor() {
-        return new ParcelFileDescriptor(fd);
+        return StandInServices.descriptor(fd);
     }
 
     public long getStartOffset() {
@@ -28,6 +30,31 @@ public class AssetFileDescriptor implements Closeable {
 
     public long getLength() {
         return length;
+    }
+
+    public FileInputStream createInputStream() throws IOException {
+        FileInputStream in = new FileInputStream(file.getFD()) {
+            private long left = length;
+
+            @Override
+            public int read() throws IOException {
+                return left-- > 0 ? super.read() : -1;
+            }
+
+            @Override
+            public int read(byte[] into, int from, int count) throws IOException {
+                try {
+                    Thread.sleep(StandInAssets.delay);
+                } catch (InterruptedException e) {
+                    throw new IOException(e);
+                }
+                int got = left <= 0 ? -1 : super.read(into, from, (int) Math.min(count, left));
+                left -= Math.max(0, got);
+                return got;
+            }
+        };
+        file.seek(offset);
+        return in;
     }
 
     @Override

@@ -32,7 +32,7 @@ public final class SessionStats {
     public final long headAccepted;
     /** Ignored: not finite. */
     public final long headNonFinite;
-    /** Ignored: not later than the one before. */
+    /** Ignored: late (a block has used one of that time or later), or at the time of another. */
     public final long headOutOfOrder;
     /** Ignored: more than 1 km away, or a time of more than 10 million seconds. */
     public final long headAbsurd;
@@ -64,11 +64,20 @@ public final class SessionStats {
         public final long overflowSamples;
         /** Clipped to 8 times full scale, input samples: a sign of integers pushed as floats. */
         public final long clippedSamples;
+        /** Not finite, which silence replaced, input samples. */
+        public final long nonFiniteSamples;
+        /** Pushed at a rate out of range and not taken, input samples. */
+        public final long badRateSamples;
+        /** Dropped because another thread was inside this voice's input and lost its core there for long, input samples. */
+        public final long contendedSamples;
 
         Voice(Row row) {
             underrunSamples = row.count();
             overflowSamples = row.count();
             clippedSamples = row.count();
+            nonFiniteSamples = row.count();
+            badRateSamples = row.count();
+            contendedSamples = row.count();
         }
     }
 

@@ -40,7 +40,7 @@ public final class VisavisMicrophone implements AutoCloseable {
         return Native.microphoneRate(handle);
     }
 
-    /** Pushes what was captured since the last call to a session, as the user's voice; call it before each poll. Returns the samples. */
+    /** Pushes what was captured since the last call to a session, as the user's voice; call it before each poll, from any thread. Returns the samples. */
     public int pump(@NonNull VisavisSession session) {
         return Native.microphonePump(handle, session.handle());
     }

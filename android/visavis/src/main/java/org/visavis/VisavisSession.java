@@ -5,7 +5,12 @@ import java.nio.ByteOrder;
 import java.nio.FloatBuffer;
 
 /**
- * One conversation with one user. Any thread may call; calls on one session take turns.
+ * One conversation with one user.
+ *
+ * <p>Any thread may call. Pushes, commands to a voice, and settings (the methods push, finish, clear, set and report) never wait, neither for a
+ * block that another thread computes nor for each other; a block goes by what came before its poll began, and the same inputs give the same
+ * motion, whichever threads they come from. A voice is one stream: one thread pushes its sound, while commands may come from others. All
+ * other calls take turns, and so may wait for a block's time.
  *
  * <p>Times are nanoseconds of session time: 0 when the session is made or reset. {@link #sessionTimeNanos()} is a clock of that kind; a
  * program that replays a recording, or has a clock of its own, passes times itself. Audio has no times: each voice is one
@@ -32,7 +37,8 @@ public final class VisavisSession implements AutoCloseable {
      * Sound that has not come when a block is computed is silence there, is counted, and is heard later.
      *
      * @param rate samples a second, 8000 to 192000
-     * @throws IllegalArgumentException for a rate out of range, samples that are not finite (nothing is taken), or a buffer that is not direct
+     * @throws IllegalArgumentException for a rate out of range or a buffer that is not direct (nothing is taken), or samples that are not
+     *     finite (they become silence, all others are taken); samples that were not taken as they were are counted
      * @throws IllegalStateException when this session is closed
      */
     public void pushAgentAudio(@NonNull FloatBuffer samples, int rate) {
@@ -59,6 +65,16 @@ public final class VisavisSession implements AutoCloseable {
         Native.finishVoice(handle, AGENT);
     }
 
+    /** The same for the user. */
+    public void finishUserAudio() {
+        Native.finishVoice(handle, USER);
+    }
+
+    /** Drops all sound of the user that has not been used. */
+    public void clearUserAudio() {
+        Native.clearVoice(handle, USER);
+    }
+
     /** Drops all sound of the agent that has not been used, as when it is interrupted. */
     public void clearAgentAudio() {
         Native.clearVoice(handle, AGENT);
@@ -75,8 +91,8 @@ public final class VisavisSession implements AutoCloseable {
     }
 
     /**
-     * Tells where the user's head is (midpoint of the eyes), world metres. Any rate; positions that are not finite, out of order or
-     * impossible are ignored and counted.
+     * Tells where the user's head is (midpoint of the eyes), world metres. Any rate; positions are put in order by time. Those that are late,
+     * not finite or impossible are ignored and counted.
      */
     public void pushUserHead(float x, float y, float z, long timeNanos) {
         Native.pushHead(handle, x, y, z, timeNanos * 1e-9);
@@ -177,7 +193,7 @@ public final class VisavisSession implements AutoCloseable {
         return (long) Math.ceil(Native.nextDue(handle) * 1e9 - 0.5);
     }
 
-    /** Starts anew with the options of now; session time is 0 again. Same inputs, same bits. */
+    /** Starts anew with the options of now; session time is 0 again. Same inputs, same bits. What was pushed before is dropped. */
     public void reset() {
         Native.reset(handle);
         start = System.nanoTime();

@@ -9,45 +9,68 @@ import org.visavis.VisavisSession;
 
 /** Block times of each sampler with one and two threads, as fast as they go. */
 final class Bench {
+    private static final String ROW = "%-10s %7s %6s %6s %6s %6s %12s";
+    /** Above the rows; times are milliseconds. */
+    static final String HEAD = String.format(Locale.ROOT, ROW, "sampler", "threads", "p50", "p95", "p99", "max", "x real time");
+    static final Sampler[] SAMPLERS = {Sampler.MIDPOINT4, Sampler.MIDPOINT2, Sampler.MIDPOINT1, Sampler.SINGLE};
+
     private Bench() {}
 
-    interface Output {
-        void line(String text);
+    /** Those of {@link #SAMPLERS} that the bundle can do. */
+    static Sampler[] samplers(VisavisEngine engine) {
+        return engine.hasStudent() ? SAMPLERS : Arrays.copyOf(SAMPLERS, SAMPLERS.length - 1);
     }
 
-    static void run(VisavisEngine engine, Wav agent, Wav user, int blocks, Output output) {
-        output.line("sampler      threads   p50 ms   p95 ms   p99 ms   max ms   frames/s   x real time");
-        for (Sampler sampler : new Sampler[] {Sampler.MIDPOINT4, Sampler.MIDPOINT2, Sampler.MIDPOINT1, Sampler.SINGLE}) {
-            for (int threads = 1; threads <= 2; threads++) {
-                if (!sampler.equals(Sampler.SINGLE) || engine.hasStudent()) {
-                    output.line(measure(engine, agent, user, blocks, sampler, threads));
-                }
-            }
-        }
-    }
-
-    private static String measure(VisavisEngine engine, Wav agent, Wav user, int blocks, Sampler sampler, int threads) {
-        double[] ms = new double[blocks];
+    /** One row; blocks that are computed show in {@code progress}. */
+    static String row(VisavisEngine engine, Wav agent, Wav user, int blocks, Sampler sampler, int threads, BlockTimes progress)
+            throws InterruptedException {
+        float[] ms = new float[blocks];
         try (VisavisSession session = engine.newSession(new SessionOptions().sampler(sampler).threads(threads).gaze(0.8f))) {
             session.warmUp();
-            session.pushAgentAudio(agent.samples, agent.rate);
-            session.pushUserAudio(user.samples, user.rate);
+            push(session, agent, user, blocks);
             float[] out = new float[session.layout().blockFloats()];
             for (int k = 0; k < blocks; k++) {
+                if (Thread.interrupted()) {
+                    throw new InterruptedException();
+                }
                 long due = session.nextDueNanos();
-                session.pushUserHead((float) Math.sin(k * 0.05), 1.65f, 1.5f, due);
+                session.pushUserHead((float) Math.sin(k * 0.05), Projection.HEAD, 1.5f, due);
                 long before = System.nanoTime();
                 session.poll(due, out, 0);
-                ms[k] = (System.nanoTime() - before) / 1e6;
+                ms[k] = (System.nanoTime() - before) / 1e6f;
+                progress.add(ms[k]);
             }
         }
-        double mean = Arrays.stream(ms).average().orElse(0);
-        Arrays.sort(ms);
-        return String.format(Locale.ROOT, "%-12s %7d %8.2f %8.2f %8.2f %8.2f %10.0f %13.1f", sampler, threads, rank(ms, 0.5), rank(ms, 0.95),
-                rank(ms, 0.99), rank(ms, 1), 4000 / mean, 4000 / mean / 30);
+        return format(sampler, threads, ms);
     }
 
-    private static double rank(double[] sorted, double p) {
-        return sorted[Math.max(1, Math.min(sorted.length, (int) Math.ceil(p * sorted.length))) - 1];
+    /** All the sound that the blocks need. */
+    private static void push(VisavisSession session, Wav agent, Wav user, int blocks) {
+        for (Wav voice : new Wav[] {agent, user}) {
+            float[] sound = new float[(int) (blocks * BlockTimes.DEADLINE / 1000 * voice.rate) + 1];
+            voice.copy(0, sound, sound.length);
+            if (voice == agent) {
+                session.pushAgentAudio(sound, 0, sound.length, voice.rate);
+            } else {
+                session.pushUserAudio(sound, 0, sound.length, voice.rate);
+            }
+        }
+    }
+
+    static String format(Sampler sampler, int threads, float[] ms) {
+        float sum = 0;
+        for (float one : ms) {
+            sum += one;
+        }
+        float mean = Math.max(1e-3f, sum / Math.max(1, ms.length));
+        float[] sorted = ms.clone();
+        Arrays.sort(sorted);
+        return String.format(Locale.ROOT, ROW, sampler, threads, one(BlockTimes.rank(sorted, 0.5)), one(BlockTimes.rank(sorted, 0.95)),
+                one(BlockTimes.rank(sorted, 0.99)), one(BlockTimes.rank(sorted, 1)), one(BlockTimes.DEADLINE / mean));
+    }
+
+    /** With one decimal. */
+    static String one(float value) {
+        return String.format(Locale.ROOT, "%.1f", value);
     }
 }

@@ -1,116 +1,79 @@
 package org.visavis.demo;
 
 import android.Manifest;
-import android.app.Activity;
+import android.content.Intent;
 import android.content.pm.PackageManager;
+import android.net.Uri;
 import android.os.Bundle;
-import android.widget.Button;
-import android.widget.LinearLayout;
-import android.widget.SeekBar;
-import android.widget.TextView;
-import java.io.IOException;
-import org.visavis.FrameLayout;
-import org.visavis.Sampler;
-import org.visavis.VisavisEngine;
-import org.visavis.VisavisException;
-import org.visavis.VisavisSession;
+import android.provider.Settings;
 
-/** An agent to look at: drag to move the user, a slider for the gaze, a button for the sampler, one for the microphone. */
-public final class DemoActivity extends Activity {
-    static final String BUNDLE = "visavis-base-i8.safetensors";
-    private static final Sampler[] SAMPLERS = {Sampler.MIDPOINT4, Sampler.MIDPOINT2, Sampler.MIDPOINT1, Sampler.SINGLE};
+/** An agent to look at and to talk to. */
+public final class DemoActivity extends ScreenActivity implements StageScreen.Actions {
+    private static final int ASKED = 1;
 
-    private VisavisEngine engine;
-    private Motion motion;
-    private int sampler;
+    private Focus focus;
 
     @Override
     protected void onCreate(Bundle state) {
         super.onCreate(state);
-        try {
-            engine = VisavisEngine.fromAsset(getAssets(), BUNDLE);
-            motion = new Motion(engine, Wav.fromAsset(getAssets(), "agent.wav"), Wav.fromAsset(getAssets(), "user.wav"));
-        } catch (IOException | VisavisException e) {
-            TextView text = new TextView(this);
-            text.setText(e.getMessage());
-            setContentView(text);
-            return;
-        }
-        setContentView(controls());
-        motion.start();
+        focus = new Focus(this, demo.life);
     }
 
-    private LinearLayout controls() {
-        LinearLayout column = new LinearLayout(this);
-        column.setOrientation(LinearLayout.VERTICAL);
-        FrameLayout layout;
-        try (VisavisSession probe = engine.newSession()) {
-            layout = probe.layout();
-        }
-        column.addView(new StageView(this, motion, engine.skeleton(), layout), new LinearLayout.LayoutParams(-1, 0, 1));
-
-        SeekBar gaze = new SeekBar(this);
-        gaze.setMax(101);
-        gaze.setProgress(0);
-        TextView label = new TextView(this);
-        label.setText(R.string.gaze_natural);
-        gaze.setOnSeekBarChangeListener(new SeekBar.OnSeekBarChangeListener() {
-            @Override
-            public void onProgressChanged(SeekBar bar, int progress, boolean fromUser) {
-                // Leftmost: natural.
-                motion.setGaze(progress == 0 ? Float.NaN : (progress - 1) / 100f);
-                label.setText(progress == 0 ? getString(R.string.gaze_natural) : getString(R.string.gaze_target, progress - 1));
-            }
-
-            @Override
-            public void onStartTrackingTouch(SeekBar bar) {}
-
-            @Override
-            public void onStopTrackingTouch(SeekBar bar) {}
-        });
-        column.addView(label);
-        column.addView(gaze);
-
-        Button choose = new Button(this);
-        choose.setText(SAMPLERS[0].toString());
-        choose.setOnClickListener(view -> {
-            sampler = (sampler + 1) % (engine.hasStudent() ? SAMPLERS.length : SAMPLERS.length - 1);
-            motion.setSampler(SAMPLERS[sampler]);
-            choose.setText(SAMPLERS[sampler].toString());
-        });
-        column.addView(choose);
-
-        Button microphone = new Button(this);
-        microphone.setText(R.string.microphone);
-        microphone.setOnClickListener(view -> listen());
-        column.addView(microphone);
-        return column;
+    @Override
+    protected void onResume() {
+        super.onResume();
+        demo.microphone.permission(permitted(), System.nanoTime());
+        demo.life.shown(true);
+        focus.keep();
     }
 
-    private void listen() {
-        if (checkSelfPermission(Manifest.permission.RECORD_AUDIO) == PackageManager.PERMISSION_GRANTED) {
-            motion.setListening(true);
-        } else {
-            requestPermissions(new String[] {Manifest.permission.RECORD_AUDIO}, 1);
+    @Override
+    protected void onPause() {
+        super.onPause();
+        demo.life.shown(false);
+        focus.keep();
+    }
+
+    @Override
+    Object subject() {
+        return demo.motion();
+    }
+
+    @Override
+    Screen screen() {
+        return new StageScreen(this, demo, this);
+    }
+
+    @Override
+    void refresh() {
+        focus.keep();
+        super.refresh();
+    }
+
+    @Override
+    public void microphone() {
+        boolean blocked = demo.microphone.state() == MicrophoneState.State.BLOCKED;
+        if (blocked) {
+            startActivity(new Intent(Settings.ACTION_APPLICATION_DETAILS_SETTINGS, Uri.fromParts("package", getPackageName(), null)));
+        } else if (demo.microphone.toggle(permitted(), System.nanoTime())) {
+            requestPermissions(new String[] {Manifest.permission.RECORD_AUDIO}, ASKED);
         }
+    }
+
+    @Override
+    public void measure() {
+        startActivity(new Intent(this, MeasureActivity.class));
+    }
+
+    private boolean permitted() {
+        return checkSelfPermission(Manifest.permission.RECORD_AUDIO) == PackageManager.PERMISSION_GRANTED;
     }
 
     @Override
     public void onRequestPermissionsResult(int code, String[] permissions, int[] results) {
         super.onRequestPermissionsResult(code, permissions, results);
-        if (results.length > 0 && results[0] == PackageManager.PERMISSION_GRANTED) {
-            motion.setListening(true);
-        }
-    }
-
-    @Override
-    protected void onDestroy() {
-        super.onDestroy();
-        if (motion != null) {
-            motion.finish();
-        }
-        if (engine != null) {
-            engine.close();
-        }
+        // No results: the question was interrupted, and may be asked again.
+        boolean again = results.length == 0 || shouldShowRequestPermissionRationale(Manifest.permission.RECORD_AUDIO);
+        demo.microphone.answered(permitted(), again, System.nanoTime());
     }
 }

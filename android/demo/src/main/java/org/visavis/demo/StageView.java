@@ -1,115 +1,118 @@
 package org.visavis.demo;
 
 import android.content.Context;
-import android.graphics.Canvas;
-import android.graphics.Color;
-import android.graphics.Paint;
+import android.opengl.GLSurfaceView;
 import android.view.MotionEvent;
-import android.view.View;
-import java.util.Locale;
+import javax.microedition.khronos.egl.EGLConfig;
+import javax.microedition.khronos.opengles.GL10;
 import org.visavis.FrameLayout;
 import org.visavis.Skeleton;
 
-/**
- * The stage: the agent as bones, the user as a disc with the line of sight between them, seen over the user's shoulder; below, the times of
- * the last blocks. Dragging moves the user.
- */
-final class StageView extends View {
-    private static final float DEADLINE_MS = 1000 * FrameLayout.FRAMES / 30f;
+/** The agent, the floor, the user as a head above a disc, and the line of sight between the two. Dragging moves the user. */
+final class StageView extends GLSurfaceView implements GLSurfaceView.Renderer {
+    /** From drawing to the picture on the screen, two frames at 72 Hz: that much ahead of the voice the pose is taken. Seconds. */
+    static final double SCREEN_DELAY = 0.028;
+    /** The camera follows the agent so slowly that steps do not shake it, seconds. */
+    private static final float FOLLOW = 1.5f;
 
     private final Motion motion;
-    private final Skeleton skeleton;
-    private final FrameLayout layout;
-    private final Paint paint = new Paint(Paint.ANTI_ALIAS_FLAG);
-    private final float[] frames;
-    private final float[] times = new float[Motion.times()];
-    private int blocks;
-    private long since;
+    private final Life life;
+    private final Scene scene;
+    private final float[] frame;
+    private final Drag drag;
+    private final float[] dragged = new float[2];
+    private final float[] walked = new float[2];
+    private volatile Projection view = new Projection(1, 1, 0, 0, 0, 0);
+    private int width = 1;
+    private int height = 1;
+    private long drawn;
 
-    StageView(Context context, Motion motion, Skeleton skeleton, FrameLayout layout) {
+    StageView(Context context, Motion motion, Skeleton skeleton, Life life, StageData data) {
         super(context);
         this.motion = motion;
-        this.skeleton = skeleton;
-        this.layout = layout;
-        this.frames = new float[motion.floats()];
+        this.life = life;
+        FrameLayout layout = motion.frames().layout();
+        scene = new Scene(data, skeleton, layout);
+        frame = new float[layout.frameFloats()];
+        drag = new Drag(Ui.dp(context, 40));
+        setContentDescription(context.getString(R.string.drag));
+        setEGLContextClientVersion(3);
+        setEGLConfigChooser(new Samples());
+        setPreserveEGLContextOnPause(true);
+        setRenderer(this);
+    }
+
+    /** Draws all the time while the conversation runs, and only when it is asked to otherwise. */
+    void refresh() {
+        setRenderMode(life.runs() ? RENDERMODE_CONTINUOUSLY : RENDERMODE_WHEN_DIRTY);
+        requestRender();
+    }
+
+    @Override
+    protected void onSizeChanged(int width, int height, int oldWidth, int oldHeight) {
+        super.onSizeChanged(width, height, oldWidth, oldHeight);
+        Projection next = new Projection(width, height, 0, 0, 0, 0);
+        next.centre(view.centreX(), view.centreZ());
+        view = next;
+        drag.end();
     }
 
     @Override
     public boolean onTouchEvent(MotionEvent event) {
-        float x = 4 * event.getX() / getWidth() - 2;
-        float z = 3.5f * (event.getY() / getHeight());
-        motion.moveUser(-x, Math.max(0.6f, z));
+        dragged[0] = motion.userX();
+        dragged[1] = motion.userZ();
+        switch (event.getActionMasked()) {
+            case MotionEvent.ACTION_DOWN:
+                drag.begin(view, event.getX(), event.getY(), dragged);
+                break;
+            case MotionEvent.ACTION_MOVE:
+                drag.move(view, event.getX(), event.getY(), dragged);
+                break;
+            default:
+                drag.end();
+        }
+        motion.moveUser(dragged[0], dragged[1]);
+        requestRender();
         return true;
     }
 
-    /** Perspective from 4.5 m in front of the agent, 1.9 m up: right of the screen is the agent's left. */
-    private float screenX(float x, float z) {
-        return getWidth() * (0.5f + 0.42f * -x / (1 - z / 4.5f) / 1.6f);
-    }
-
-    private float screenY(float y, float z) {
-        return getHeight() * 0.62f - getWidth() * 0.3f * (y - 0.9f) / (1 - Math.min(z, 4) / 4.5f);
+    @Override
+    public void onSurfaceCreated(GL10 unused, EGLConfig config) {
+        try {
+            scene.create();
+        } catch (RuntimeException e) {
+            life.failed(Failure.of("drawing the stage", e));
+        }
     }
 
     @Override
-    protected void onDraw(Canvas canvas) {
-        super.onDraw(canvas);
-        int now = motion.snapshot(frames, times);
-        if (now != blocks) {
-            blocks = now;
-            since = System.nanoTime();
-        }
-        canvas.drawColor(Color.rgb(24, 26, 32));
-        if (blocks > 0) {
-            int frame = (int) Math.min(FrameLayout.FRAMES - 1, (System.nanoTime() - since) * 30 / 1_000_000_000L);
-            drawAgent(canvas, frame);
-            drawTimes(canvas);
-        }
-        postInvalidateOnAnimation();
+    public void onSurfaceChanged(GL10 unused, int width, int height) {
+        this.width = width;
+        this.height = height;
     }
 
-    private void drawAgent(Canvas canvas, int frame) {
-        paint.setColor(Color.rgb(230, 200, 160));
-        paint.setStrokeWidth(getWidth() / 60f);
-        paint.setStrokeCap(Paint.Cap.ROUND);
-        for (int j = 1; j < skeleton.size(); j++) {
-            int to = layout.joint(frame, j) + FrameLayout.POSITION;
-            int from = layout.joint(frame, skeleton.parent(j)) + FrameLayout.POSITION;
-            canvas.drawLine(screenX(frames[from], frames[from + 2]), screenY(frames[from + 1], frames[from + 2]),
-                    screenX(frames[to], frames[to + 2]), screenY(frames[to + 1], frames[to + 2]), paint);
+    @Override
+    public void onDrawFrame(GL10 unused) {
+        Projection now = view;
+        long time = System.nanoTime();
+        boolean there = !Double.isNaN(motion.frames().pose(motion.clock().heardSoon(time, SCREEN_DELAY), frame));
+        if (there && !drag.active()) {
+            follow(now, (time - drawn) * 1e-9f);
         }
-        int head = layout.joint(frame, skeleton.indexOf("head")) + FrameLayout.POSITION;
-        float headX = screenX(frames[head], frames[head + 2]);
-        float headY = screenY(frames[head + 1] + 0.08f, frames[head + 2]);
-        canvas.drawCircle(headX, headY, getWidth() / 28f, paint);
-
-        float userX = screenX(motion.userX(), motion.userZ());
-        float userY = screenY(1.65f, motion.userZ());
-        float gaze = frames[layout.frame(frame) + FrameLayout.GAZE];
-        paint.setStrokeWidth(getWidth() / 300f);
-        paint.setColor(gaze > 0.9f ? Color.rgb(120, 220, 140) : Color.rgb(120, 120, 130));
-        canvas.drawLine(headX, headY, userX, userY, paint);
-        paint.setColor(Color.rgb(110, 160, 240));
-        canvas.drawCircle(userX, userY, getWidth() / 30f, paint);
+        drawn = time;
+        scene.draw(now, width, height, there ? frame : null, motion.userX(), motion.userZ(), drag.active());
     }
 
-    private void drawTimes(Canvas canvas) {
-        float bottom = getHeight() - 8;
-        float height = getHeight() / 8f;
-        float step = getWidth() / (float) times.length;
-        paint.setStrokeWidth(step * 0.7f);
-        float sum = 0;
-        int count = Math.min(blocks, times.length);
-        for (int i = 0; i < times.length; i++) {
-            paint.setColor(times[i] > DEADLINE_MS ? Color.RED : Color.rgb(120, 220, 140));
-            canvas.drawLine((i + 0.5f) * step, bottom, (i + 0.5f) * step, bottom - height * Math.min(1, times[i] / DEADLINE_MS), paint);
-            sum += times[i];
+    /** The middle of the stage goes after the agent; the user goes along, as someone who walks beside it. */
+    private void follow(Projection view, float seconds) {
+        float share = 1 - (float) Math.exp(-Math.min(1, Math.max(0, seconds)) / FOLLOW);
+        view.centre(view.centreX() + share * (frame[FrameLayout.ROOT] - view.centreX()),
+                view.centreZ() + share * (frame[FrameLayout.ROOT + 1] - view.centreZ()));
+        walked[0] = motion.userX();
+        walked[1] = motion.userZ();
+        view.clampToReach(walked);
+        if (!drag.active()) {
+            motion.moveUser(walked[0], walked[1]);
         }
-        paint.setColor(Color.WHITE);
-        paint.setTextSize(getWidth() / 28f);
-        float mean = sum / Math.max(1, count);
-        String text = String.format(Locale.ROOT, "block %.1f ms of %.0f, %.1f x real time  %s", mean, DEADLINE_MS, DEADLINE_MS / Math.max(mean, 0.01f),
-                motion.note());
-        canvas.drawText(text, 12, bottom - height - 12, paint);
     }
 }

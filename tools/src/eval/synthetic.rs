@@ -1,4 +1,5 @@
-//! A made-up test set: a procedural person in a given conversation, for a look at how a bundle does where there are no recordings.
+//! A synthetic test set: a procedural person in a given conversation, for a look at how a bundle
+//! does where there are no recordings.
 
 use super::clip::{Clip, Segment};
 use crate::metrics::envelope;
@@ -14,16 +15,17 @@ const BODY_RATE: f32 = 0.04;
 /// The body does not follow before the user is this far to the side, radians.
 const REACH: f32 = 0.6;
 
-/// Two clips on `rig`: the conversation, and the same with the voices swapped. The agent stands, follows the user with head and body,
-/// and lifts its hands with its voice.
+/// Two clips on `rig`: the conversation, and the same with the voices swapped. The agent stands,
+/// follows the user with head and body, and lifts its hands with its voice.
 ///
-/// Nobody was recorded and nothing was learnt: figures on it say whether a bundle works, not how good it is.
-pub fn made_up(rig: &Rig, talk: &Conversation) -> Vec<Clip> {
+/// Nobody was recorded and nothing was learnt: figures on it say whether a bundle works, not how
+/// good it is.
+pub fn synthetic(rig: &Rig, talk: &Conversation) -> Vec<Clip> {
     let voices = [talk.agent(), talk.user()];
     let clip = |name: &str, [agent, user]: [Option<&[f32]>; 2]| {
         Clip::from_segment(name, segment(rig, talk, agent.unwrap_or_default(), user.unwrap_or_default()))
     };
-    vec![clip("made up", voices), clip("made up, voices swapped", [voices[1], voices[0]])]
+    vec![clip("synthetic", voices), clip("synthetic, voices swapped", [voices[1], voices[0]])]
 }
 
 fn segment(rig: &Rig, talk: &Conversation, agent: &[f32], user: &[f32]) -> Segment {

@@ -1,0 +1,5 @@
+package javax.microedition.khronos.egl;
+
+public abstract class EGLDisplay {
+    public EGLDisplay() {}
+}
