@@ -105,6 +105,7 @@ impl Voice {
     }
 
     /// Absent, empty and at time 0, as when new.
+    #[cfg(test)]
     pub fn reset(&mut self) {
         self.reset_at(0);
     }
