@@ -2,7 +2,10 @@
 
 use super::people::speech;
 use super::window::Window;
-use crate::metrics::{Liveliness, Moments, NodTally, Nods, Space, Split, Summary, Tally, acceleration_moments, ape, frechet, pck, pose_moments};
+use crate::metrics::{
+    Liveliness, Moments, NodTally, Nods, Space, Split, Summary, Tally, acceleration_moments, ape, frechet, pck,
+    pose_moments,
+};
 use serde::Serialize;
 use visavis::{Frame, Result, Rig};
 

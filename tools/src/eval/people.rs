@@ -109,7 +109,8 @@ impl Idle {
 fn idle(segment: &Segment) -> Vec<bool> {
     let n = segment.frames.len();
     let (agent, user) = (speech(segment.agent(), n), speech(segment.user(), n));
-    let near = |mask: &[bool], i: usize, reach: usize| mask[i.saturating_sub(reach)..(i + reach + 1).min(n)].contains(&true);
+    let near =
+        |mask: &[bool], i: usize, reach: usize| mask[i.saturating_sub(reach)..(i + reach + 1).min(n)].contains(&true);
     // The speed of the head over five frames: a standing head sways.
     let moves: Vec<bool> = (0..n)
         .map(|i| {
@@ -135,10 +136,12 @@ mod tests {
 
     #[test]
     fn short_pauses_belong_to_speech_and_idle_keeps_away_from_it() {
-        let tone = |from: usize, to: usize| (0..400 * FRAME_SAMPLES).map(move |i| {
-            let loud = (from * FRAME_SAMPLES..to * FRAME_SAMPLES).contains(&i);
-            if loud { 0.3 * (0.1 * i as f32).sin() } else { 0.0 }
-        });
+        let tone = |from: usize, to: usize| {
+            (0..400 * FRAME_SAMPLES).map(move |i| {
+                let loud = (from * FRAME_SAMPLES..to * FRAME_SAMPLES).contains(&i);
+                if loud { 0.3 * (0.1 * i as f32).sin() } else { 0.0 }
+            })
+        };
         let mut voice: Vec<f32> = tone(50, 80).collect();
         voice.iter_mut().zip(tone(90, 120)).for_each(|(a, b)| *a += b);
         let found = speech(Some(voice.clone()), 400);

@@ -43,8 +43,14 @@ impl Report {
         };
         part("Motion (speaking / non-speaking in brackets; FGD cm², FGD_acc (m/s²)², wrists m/s)", &self.motion());
         part("Feet, voice, keypoints (support foot mm/s, APE mm, PCK at 10 cm, bones %)", &self.details());
-        part("At rest, the user stands and nobody speaks (both hands below 3 cm/s; hands and head relative to the hips, m/s, m/s²; a minute; cm in 30 s; power of hand speed by octave from 0.2 to 8 Hz, mm/s)", &self.at_rest());
-        part("Listening and speaking (likewise; nods a minute while the user speaks / in the pauses / when nobody does)", &self.talk());
+        part(
+            "At rest, the user stands and nobody speaks (both hands below 3 cm/s; hands and head relative to the hips, m/s, m/s²; a minute; cm in 30 s; power of hand speed by octave from 0.2 to 8 Hz, mm/s)",
+            &self.at_rest(),
+        );
+        part(
+            "Listening and speaking (likewise; nods a minute while the user speaks / in the pauses / when nobody does)",
+            &self.talk(),
+        );
         if !self.dials.is_empty() {
             part("Gaze dial: mean score reached", &self.gaze());
         }
