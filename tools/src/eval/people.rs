@@ -18,13 +18,12 @@ const PEOPLE: &str = include_str!("people.json");
 /// Silent sessions that are averaged, and the seconds of each: eight minutes.
 const RUNS: usize = 4;
 const SECONDS: usize = 120;
-/// Nobody speaks within this of an idle frame, and pauses up to this belong to the speech around
-/// them, frames.
-const MARGIN: usize = 18;
-/// A user whose head is slower than this stands, m/s; an idle agent's user has stood and will stand
-/// for two seconds.
+/// Pauses up to this long belong to the speech around them, frames.
+const PAUSE: usize = 18;
+/// A user whose head is slower than this stands, m/s.
 const STANDS: f32 = 0.25;
-const STOOD: usize = 2 * FPS as usize;
+/// In an idle frame nobody has spoken or moved for this long, nor will, frames.
+const QUIET: usize = 2 * FPS as usize;
 
 /// A motion at rest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -62,7 +61,7 @@ pub(super) fn speech(voice: Option<Vec<f32>>, frames: usize) -> Vec<bool> {
     let mut last = None;
     for i in 0..frames {
         if speech[i] {
-            if let Some(last) = last.filter(|last| i - last <= MARGIN) {
+            if let Some(last) = last.filter(|last| i - last <= PAUSE) {
                 speech[last..i].fill(true);
             }
             last = Some(i);
@@ -111,12 +110,11 @@ impl Idle {
     }
 }
 
-/// Frames in which nobody speaks, nor does within 0.6 s, and the user stands.
+/// Frames in which nobody speaks, nor does within two seconds, and the user stands.
 fn idle(segment: &Segment) -> Vec<bool> {
     let n = segment.frames.len();
     let (agent, user) = (speech(segment.agent(), n), speech(segment.user(), n));
-    let near =
-        |mask: &[bool], i: usize, reach: usize| mask[i.saturating_sub(reach)..(i + reach + 1).min(n)].contains(&true);
+    let near = |mask: &[bool], i: usize| mask[i.saturating_sub(QUIET)..(i + QUIET + 1).min(n)].contains(&true);
     // The speed of the head over five frames: a standing head sways.
     let moves: Vec<bool> = (0..n)
         .map(|i| {
@@ -124,7 +122,7 @@ fn idle(segment: &Segment) -> Vec<bool> {
             segment.user[a].distance(segment.user[b]) * FPS as f32 > STANDS * (b - a).max(1) as f32
         })
         .collect();
-    (0..n).map(|i| !near(&agent, i, MARGIN) && !near(&user, i, MARGIN) && !near(&moves, i, STOOD)).collect()
+    (0..n).map(|i| !near(&agent, i) && !near(&user, i) && !near(&moves, i)).collect()
 }
 
 #[cfg(test)]
@@ -164,6 +162,6 @@ mod tests {
             user_voice: None,
         };
         let idle = idle(&segment);
-        assert!(idle[10] && idle[200] && !idle[70] && !idle[135] && !idle[260] && !idle[350], "{idle:?}");
+        assert!(!idle[10] && idle[200] && !idle[70] && !idle[135] && !idle[260] && !idle[350], "{idle:?}");
     }
 }

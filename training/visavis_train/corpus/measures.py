@@ -135,7 +135,7 @@ def mean_row(tallies):
     return out
 
 
-def states(agent_phrases, user_phrases, frames, margin=0.6):
+def states(agent_phrases, user_phrases, frames, margin=2.0):
     """Masks [T] bool of a conversation: `speaking` the agent, `listening` the user alone, `idle` nobody within `margin` seconds."""
     from .attention import mask
     a, u = mask(agent_phrases, frames), mask(user_phrases, frames)

@@ -21,10 +21,10 @@ TWIST, FLEX = 0.15, 0.10         # of a resting hand about the forearm and at th
 # Recordings by split; a person is in one split only. The number is how often one is drawn: in train so that the time that
 # is drawn of each makes the mean of the people who did not act (least squares on what each alone gives, near equal times).
 TAKES = {
-    "train": {"reactidle/000_genuine": 0.40, "reactidle/002_genuine": 0.38, "reactidle/003_genuine": 0.29, "reactidle/007_genuine": 0.27,
-              "reactidle/010_genuine": 0.46, "reactidle/015_genuine": 0.40, "reactidle/001_acted": 0.06, "reactidle/002_acted": 0.03,
-              "reactidle/003_acted": 0.03, "reactidle/004_acted": 0.09, "reactidle/007_acted": 0.24, "reactidle/010_acted": 0.08,
-              "accad_female1/Female1_A04_Look": 0.85, "rocketbox/f_idle_neutral_01": 0.34},
+    "train": {"reactidle/000_genuine": 0.155, "reactidle/002_genuine": 0.36, "reactidle/003_genuine": 0.14, "reactidle/007_genuine": 0.11,
+              "reactidle/010_genuine": 0.45, "reactidle/015_genuine": 0.33, "reactidle/001_acted": 0.06, "reactidle/002_acted": 0.03,
+              "reactidle/003_acted": 0.07, "reactidle/004_acted": 0.07, "reactidle/007_acted": 0.14, "reactidle/010_acted": 0.14,
+              "accad_female1/Female1_A04_Look": 0.70, "rocketbox/f_idle_neutral_01": 0.18},
     "val": {"reactidle/011_genuine": 1.0, "reactidle/011_acted": 0.5, "reactidle/013_acted": 0.2},
     "test": {"reactidle/008_genuine": 1.0, "reactidle/008_acted": 0.5, "reactidle/009_acted": 0.5},
 }
@@ -176,7 +176,7 @@ def dressed(positions, rotations):
 
 @dataclass
 class Library:
-    """Recordings of a split with the weight of each, mirrored ones beside them."""
+    """Recordings of a split with the weight of each, each followed by its mirror image."""
     names: list
     rests: list
     weights: np.ndarray
@@ -220,10 +220,10 @@ def _blend(a, b, m):
     return Rest(**out)
 
 
-def _join(rng, rest, spots, other, least):
+def _join(rng, rest, spots, other):
     """(cost, spot, start, frames): the frame of `spots` and the one of `other` at which a change-over shows least, and over
-    how many frames; both bodies alike and calm. `least`: frames of `other` that must follow."""
-    last = max(1, len(other) - least)
+    how many frames; both bodies alike and calm. A long recording is entered anywhere, a short one early."""
+    last = max(1, len(other) - (12 * FPS if len(other) > 40 * FPS else int(0.8 * len(other))))
     first = int(rng.integers(0, max(1, last - ENTRY)))         # a random stretch, so that all of a recording comes to be seen
     pose, calm = _pose(other)[first:last][:ENTRY], _unrest(other)[first:last][:ENTRY]
     d = np.linalg.norm(pose[None] - _pose(rest)[spots][:, None], axis=2) + 1.0 * (calm[None] + _unrest(rest)[spots][:, None])
@@ -233,41 +233,35 @@ def _join(rng, rest, spots, other, least):
     return cost, int(spots[i]), int(k), int(FPS * np.clip(np.sqrt(PEAK * reach / GENTLE), 1.8, 5.0))
 
 
+GOLDEN = 0.6180339887    # multiples of it, modulo 1, fill 0..1 evenly
+
+
 def compose(rng, library, frames, quantile=None):
-    """Rest of `frames` frames from the library, the change-overs [(start, end)] and the names of what was used. `quantile`:
-    which recording comes first, 0..1 of the weights in their order, else at random."""
-    p = library.weights / library.weights.sum()
-    k = int(min(np.searchsorted(np.cumsum(p), rng.random() if quantile is None else quantile), len(p) - 1))
-    used = [library.names[k]]
-    rest = library.rests[k]
+    """Rest of `frames` frames from the library, the change-overs [(start, end)] and the names of what was used.
+
+    `quantile`: which recording comes first, 0..1 of the weights in their order, at random if None; those that follow are
+    spread evenly from there, so that few clips suffice to draw each by its weight."""
+    edges = np.cumsum(library.weights / library.weights.sum())
+    quantile = rng.random() if quantile is None else quantile
+    pick = lambda i: int(min(np.searchsorted(edges, (quantile + i * GOLDEN) % 1.0), len(edges) - 1))
+    k = pick(0)
+    used, rest = [library.names[k]], library.rests[k]
     at = int(rng.integers(0, max(1, len(rest) - 20 * FPS)))
-    out, joins, n = None, [], 0
-    while True:
-        left = len(rest) - at
-        if n + left >= frames:
-            piece = rest.cut(at, at + frames - n)
-            out = piece if out is None else _concat(out, piece)
-            return out, joins, used
-        # the next one: of two draws the one whose pose is nearest to one of the last seconds of this one
+    parts, joins, n = [], [], 0
+    while n + len(rest) - at < frames:
+        # the next one, as it is or mirrored: whichever has the pose nearest to one of the last seconds of this one
+        k = pick(len(used)) // 2 * 2
         end = max(at + 1, len(rest) - 5 * FPS)
-        spots = np.unique(rng.integers(max(at, end - 10 * FPS), end, 12))
-        draws = rng.choice(len(p), 2, p=p)
-        cost, spot, start, span, j = min(_join(rng, rest, spots, library.rests[j], 12 * FPS) + (int(j),) for j in draws)
-        span = max(2, min(span, len(rest) - spot, len(library.rests[j]) - start))
-        piece = rest.cut(at, spot)
-        out = piece if out is None else _concat(out, piece)
+        spots = np.unique(rng.integers(max(at, end - min(10 * FPS, len(rest) // 5)), end, 12))
+        _, spot, start, span, k = min(_join(rng, rest, spots, library.rests[j]) + (j,) for j in (k, k + 1))
+        other = library.rests[k]
+        span = max(2, min(span, len(rest) - spot, len(other) - start))
+        parts += [rest.cut(at, spot), _blend(rest.cut(spot, spot + span), other.cut(start, start + span), minjerk((np.arange(span) + 1) / (span + 1)))]
         n += spot - at
-        other = library.rests[j]
-        blend = _blend(rest.cut(spot, spot + span), other.cut(start, start + span), minjerk((np.arange(span) + 1) / (span + 1)))
-        take_ = min(span, frames - n)
-        out = _concat(out, blend.cut(0, take_))
-        joins.append((n, n + take_))
-        n += take_
-        if n >= frames:
-            return out, joins, used
+        joins.append((min(n, frames), min(n + span, frames)))
+        n += span
         rest, at = other, start + span
-        used.append(library.names[j])
-
-
-def _concat(a, b):
-    return Rest(**{f.name: np.concatenate([getattr(a, f.name), getattr(b, f.name)]) for f in fields(a)})
+        used.append(library.names[k])
+    parts.append(rest.cut(at, at + max(frames - n, 0)))
+    whole = Rest(**{f.name: np.concatenate([getattr(p, f.name) for p in parts])[:frames] for f in fields(rest)})
+    return whole, [(a, b) for a, b in joins if b > a], used

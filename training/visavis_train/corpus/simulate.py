@@ -57,7 +57,7 @@ def simulate_clip(rng, frames, src, level_quantile=None, rest_quantile=None, sil
     level = attention.level_track(rng, frames, level_quantile)
     offset, bias = attention.offsets(rng, level, speaking)
     mobility = rng.beta(0.5, 4.0) - 0.12 if silent else rng.beta(1.2, 1.5)
-    enc = encounter.simulate(rng, frames, bias, mobility, src.paths, (20, 90) if silent else (12, 50))
+    enc = encounter.simulate(rng, frames, bias, mobility, src.paths, (30, 120) if silent else (12, 50))
     steps = feet.plan(rng, enc.root, enc.yaw, src.swings)
     if agent_phrases:
         loud = voices.loudness(talk.agent)
