@@ -120,7 +120,7 @@ impl Engine {
     /// As [`Engine::load`]; [`ErrorKind::Argument`] when the file is shorter.
     #[cfg(unix)]
     pub fn from_fd(fd: std::os::fd::BorrowedFd<'_>, offset: u64, length: Option<u64>) -> Result<Arc<Self>> {
-        const NAME: &str = "bundle in an open file";
+        const NAME: &str = "bundle asset";
         let own = fd.try_clone_to_owned().map_err(|e| Error::io("duplicate the descriptor", NAME, e))?;
         Self::from_bundle(&BundleFile::open_part(&own.into(), offset, length, NAME)?, Networks::default())
     }

@@ -21,7 +21,7 @@ macro_rules! scale {
             }
 
             /// The values, out of the scale's keeping.
-            #[cfg(feature = "internals")]
+            #[cfg_attr(not(feature = "internals"), allow(dead_code, reason = "of one scale alone"))]
             pub fn into_inner(self) -> B {
                 self.0
             }

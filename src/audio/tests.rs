@@ -103,7 +103,7 @@ fn absent_is_not_silent_and_late_sound_follows_after_silence() {
     assert_eq!(e.kind(), ErrorKind::State);
     assert!(voice.take_block(u64::MAX, &mut [0.0; 3_200]).is_err());
     assert_eq!(voice.stats().underrun_samples, 2_200);
-    voice.reset();
+    voice.reset_at(0);
     assert_eq!(voice.stats(), VoiceStats::default());
     assert!(voice.take_block(0, &mut [0.0; 3_200]).is_ok());
 }

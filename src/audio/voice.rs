@@ -104,11 +104,6 @@ impl Voice {
         VoiceStats { underrun_samples: self.underrun, ..self.input.line().stats() }
     }
 
-    /// Absent, empty and at time 0, as when new.
-    pub fn reset(&mut self) {
-        self.reset_at(0);
-    }
-
     /// Absent and empty; the next sound that is pushed belongs to block `block` and those after it.
     pub fn reset_at(&mut self, block: u64) {
         self.input.reset();

@@ -71,6 +71,7 @@ impl Pool {
 
     /// Whether the helper takes part from the next [`begin`](Self::begin) on: false without one,
     /// and while it costs more than it saves.
+    #[cfg(any(test, feature = "internals"))]
     pub fn together(&self) -> bool {
         self.helper.as_ref().is_some_and(|helper| helper.ledger.together())
     }

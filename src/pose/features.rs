@@ -126,7 +126,7 @@ impl Decoder {
     /// # Panics
     /// If `x` is not F long.
     pub fn prime(&mut self, x: Metric<&[f32]>) {
-        let x = x.into_inner();
+        let x = x.values();
         assert_eq!(x.len(), self.feature_count(), "a feature vector has 3 + 36 J values");
         self.transforms(None, x);
         self.guard.prime(&self.joints[..self.previous.len()]);
@@ -174,7 +174,7 @@ impl Decoder {
         x: Metric<&[f32]>,
         frames: &mut [Frame],
     ) -> Result<()> {
-        let x = x.into_inner();
+        let x = x.values();
         let (n, width) = (self.previous.len(), self.feature_count());
         assert!(frames.len() <= BLOCK_FRAMES, "a block has at most four frames");
         assert_eq!(x.len(), width * frames.len(), "a feature vector has 3 + 36 J values");

@@ -2,6 +2,8 @@
 
 use super::governor::{self, Decision, Governor, GovernorStats, Hold, Plan, Policy};
 use super::{Session, options};
+#[cfg(doc)]
+use crate::error::ErrorKind;
 use crate::error::Result;
 use crate::frame::Sampler;
 

@@ -94,7 +94,7 @@ pub(crate) fn part(length: usize, offset: i32, count: i32) -> Outcome<usize> {
 mod tests {
     use super::*;
     use std::path::Path;
-    use visavis::{Engine, SessionOptions, SharedSession, Speaker};
+    use visavis::{Engine, ErrorKind, SessionOptions, SharedSession, Speaker};
 
     /// What Java may do with one buffer: two threads push from it into one session, and one of them
     /// into both voices, a third changes what is in it, a fourth polls into it. Under the
@@ -110,14 +110,19 @@ mod tests {
                 scope.spawn(|| {
                     for i in 0..200 {
                         let speaker = [Speaker::Agent, Speaker::User][i % 2];
-                        with_floats(&buffer[i..i + 480], |sound| shared.voice(speaker).push(sound, 48_000).unwrap());
+                        // A frame in the buffer may hold NaN, for a gaze score that is not known.
+                        let pushed =
+                            with_floats(&buffer[i..i + 480], |sound| shared.voice(speaker).push(sound, 48_000));
+                        if let Err(error) = pushed {
+                            assert_eq!(error.kind(), ErrorKind::Audio, "{error}");
+                        }
                         shared.head().push(visavis::glam::Vec3::Y, i as f64 / 100.0);
                     }
                 });
             }
             scope.spawn(|| {
-                for i in 0..2_000 {
-                    buffer[i].store(0.25f32.to_bits(), Relaxed);
+                for number in &buffer[..2_000] {
+                    number.store(0.25f32.to_bits(), Relaxed);
                 }
             });
             for _ in 0..4 {
@@ -126,7 +131,6 @@ mod tests {
                 crate::session::write(frames, |at, value| buffer[at].store(value.to_bits(), Relaxed));
             }
         });
-        let stats = shared.lock().unwrap().stats();
-        assert_eq!((stats.blocks, stats.inputs.agent_voice.non_finite_samples), (4, 0));
+        assert_eq!(shared.lock().unwrap().stats().blocks, 4);
     }
 }

@@ -70,5 +70,5 @@ fn seeded_sizes_run_quantised() {
 fn sizes_have_names() {
     assert_eq!("paper".parse::<Size>().unwrap(), Size::Paper);
     assert_eq!("mid".parse::<Size>().unwrap(), Size::Mid);
-    assert!("huge".parse::<Size>().unwrap_err().to_string().contains("paper or base"));
+    assert!("huge".parse::<Size>().unwrap_err().to_string().contains("paper, mid or base"));
 }
