@@ -1,9 +1,10 @@
 //! After the first push of a voice, pushing and setting allocate nothing: proved with an allocator
 //! that counts, thread by thread.
 
+mod common;
+
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
-use std::ptr::{null, null_mut};
 use visavis_c::*;
 
 struct Counting;
@@ -38,14 +39,7 @@ fn calls(work: impl FnOnce()) -> u64 {
 
 #[test]
 fn pushing_allocates_nothing_after_the_first() {
-    let bundle =
-        std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/goldens/tiny.safetensors")).expect("a bundle");
-    let (mut engine, mut session) = (null_mut(), null_mut());
-    // SAFETY: a slice, places for pointers, an engine that lives on.
-    unsafe {
-        assert_eq!(visavis_engine_from_memory(bundle.as_ptr(), bundle.len(), &mut engine), VisavisStatus::Ok);
-        assert_eq!(visavis_session_new(engine, null(), &mut session), VisavisStatus::Ok);
-    }
+    let (engine, session) = common::tiny();
     let sound = [0.1f32; 960];
     let push = |i: usize| {
         // SAFETY: alive; that many samples.

@@ -1,7 +1,9 @@
 //! Several threads in one session, by way of the C functions: two that push from one buffer and set
 //! what there is to set, and one that polls. Also under the sanitizers (`tests/sanitize.sh`).
 
-use std::ptr::{null, null_mut};
+mod common;
+
+use std::ptr::null_mut;
 use visavis_c::*;
 
 /// A pointer that threads may share.
@@ -22,14 +24,7 @@ unsafe impl<T> Sync for Shared<T> {}
 
 #[test]
 fn two_push_from_one_buffer_while_a_third_polls() {
-    let bundle =
-        std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/goldens/tiny.safetensors")).expect("a bundle");
-    let (mut engine, mut session) = (null_mut(), null_mut());
-    // SAFETY: a slice, places for pointers, an engine that lives on.
-    unsafe {
-        assert_eq!(visavis_engine_from_memory(bundle.as_ptr(), bundle.len(), &mut engine), VisavisStatus::Ok);
-        assert_eq!(visavis_session_new(engine, null(), &mut session), VisavisStatus::Ok);
-    }
+    let (engine, session) = common::tiny();
     let mut sound = [0.1f32; 960];
     let (session, buffer) = (Shared(session), Shared(sound.as_mut_ptr()));
     std::thread::scope(|scope| {
