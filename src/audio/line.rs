@@ -18,7 +18,7 @@ pub struct VoiceStats {
     /// Pushed at a rate out of range and not taken, input samples.
     pub bad_rate_samples: u64,
     /// Dropped because another thread was inside this voice's input and lost its core there for
-    /// long, input samples.
+    /// long, input samples; a command that was dropped counts as one.
     pub contended_samples: u64,
 }
 

@@ -104,42 +104,49 @@ final class ThreadTest {
         }
     }
 
-    /** While one thread has the session for long, others push and set, from one buffer too, and are through long before. */
+    /** While one thread has the session for long, others push and set, from one buffer too, and are through before. */
     static void testNobodyWaitsForABlock() throws Exception {
         try (VisavisEngine engine = engine();
                 VisavisSession session = engine.newSession()) {
-            long before = System.nanoTime();
-            session.warmUp(20);
-            // Five seconds of blocks in one call.
-            int blocks = (int) Math.max(100, 20 * 5_000_000_000L / (System.nanoTime() - before));
-            AtomicBoolean over = new AtomicBoolean();
-            CountDownLatch inside = new CountDownLatch(1);
-            FloatBuffer sound = Check.direct(480);
-            List<Check.Action> actions = new ArrayList<>();
-            actions.add(() -> {
-                inside.countDown();
-                session.warmUp(blocks);
-                over.set(true);
-            });
-            for (int t = 0; t < 2; t++) {
-                int thread = t;
-                actions.add(() -> {
-                    inside.await();
-                    Thread.sleep(200);
-                    for (int i = 0; i < 200; i++) {
-                        session.pushAgentAudio(sound, 48_000);
-                        session.pushUserAudio(sound, 48_000);
-                        session.pushUserHead(0, 1.6f, 1.5f, i * 2_000_000L + thread);
-                        session.setGaze(0.5f);
-                        session.setGuidance(1.3f, 2);
-                        session.setBudget(0);
-                        session.setUserAudioPresent(true);
-                    }
-                    isTrue(!over.get(), "pushes while another thread is inside the session");
-                });
+            // Who waited for the session would come last however long it is away; who lost their core may need another try.
+            boolean through = false;
+            for (int blocks = 500; !through && blocks <= 8_000; blocks *= 4) {
+                through = pushesEndFirst(session, blocks);
             }
-            together(actions);
+            isTrue(through, "pushes while another thread is inside the session");
         }
+    }
+
+    private static boolean pushesEndFirst(VisavisSession session, int blocks) throws Exception {
+        AtomicBoolean over = new AtomicBoolean();
+        AtomicBoolean late = new AtomicBoolean();
+        CountDownLatch inside = new CountDownLatch(1);
+        FloatBuffer sound = Check.direct(480);
+        List<Check.Action> actions = new ArrayList<>();
+        actions.add(() -> {
+            inside.countDown();
+            session.warmUp(blocks);
+            over.set(true);
+        });
+        for (int t = 0; t < 2; t++) {
+            int thread = t;
+            actions.add(() -> {
+                inside.await();
+                Thread.sleep(20);
+                for (int i = 0; i < 200; i++) {
+                    session.pushAgentAudio(sound, 48_000);
+                    session.pushUserAudio(sound, 48_000);
+                    session.pushUserHead(0, 1.6f, 1.5f, i * 2_000_000L + thread);
+                    session.setGaze(0.5f);
+                    session.setGuidance(1.3f, 2);
+                    session.setBudget(0);
+                    session.setUserAudioPresent(true);
+                }
+                late.compareAndSet(false, over.get());
+            });
+        }
+        together(actions);
+        return !late.get();
     }
 
     /** Threads push their part of the inputs, one of them in pieces: the motion is that of one thread. */
