@@ -10,7 +10,7 @@ use std::time::Duration;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use half::f16;
 use visavis::internals::kernels::{
-    Epilogue, Exec, I4_GROUP, Kernels, KvCache, KvDtype, Limits, Matrix, RowTable, Span, WeightData, Weights,
+    Epilogue, Exec, I4_GROUP, Kernels, KvCache, KvDtype, Matrix, RowTable, Span, WeightData, Weights,
 };
 
 const SCHEMES: [&str; 4] = ["f32", "f16", "i8", "i4"];
@@ -44,7 +44,7 @@ fn levels() -> Vec<Kernels> {
 }
 
 fn exec(kernels: Kernels, threads: usize) -> Exec {
-    let mut exec = Exec::new(kernels, threads, Limits { rows: 16, width: 4096 }).expect("a thread");
+    let mut exec = Exec::new(kernels, threads, 4096).expect("a thread");
     exec.begin();
     exec
 }

@@ -9,7 +9,7 @@ use crate::config::Config;
 use crate::error::{Error, ErrorKind, Result};
 use crate::flow::{ConditionLayout, FlowNet, Nets, reference_times, student_times};
 use crate::frame::{BLOCK_FRAMES, Sampler, feature_count};
-use crate::kernels::{Exec, Kernels, KvDtype, Limits};
+use crate::kernels::{Exec, Kernels, KvDtype};
 use crate::normaliser::{Metric, Normaliser, Standardised};
 use crate::rig::Rig;
 use crate::vae::{Decoder, Encoder};
@@ -19,8 +19,9 @@ use std::sync::Arc;
 /// Most frames of an idle clip: every session starts by going through them.
 const MAX_IDLE_FRAMES: usize = 3600;
 
-/// Which networks of a bundle an engine holds: what no session will use need not take memory, nor
-/// time to load.
+/// Which networks of a bundle an engine holds.
+///
+/// What no session will use need not take memory, nor time to load.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Networks {
     /// The network of the samplers with steps: midpoint and Euler. Without it sessions need
@@ -43,8 +44,9 @@ impl Default for Networks {
     }
 }
 
-/// A loaded model: networks packed for this CPU, rig and statistics. Immutable and shared; all that
-/// changes is in [`Session`](crate::Session).
+/// A loaded model: networks packed for this CPU, rig and statistics.
+///
+/// Immutable and shared; all that changes is in [`Session`](crate::Session).
 ///
 /// ```no_run
 /// # fn main() -> visavis::Result<()> {
@@ -329,15 +331,14 @@ impl Engine {
     /// An executor with scratch for the widest operation of any of the networks.
     pub(crate) fn exec(&self, threads: usize) -> Result<Exec> {
         let c = &self.config;
-        let (rows, audio) = AudioEncoder::limits(&c.audio);
-        let rows = rows.max(32);
+        let audio = AudioEncoder::width(&c.audio);
         let flow =
             [c.flow.width * c.flow.mlp.max(6), c.flow.embed_user + 2 * c.flow.embed_voice + c.flow.embed_gaze + 4];
         let rest =
             [c.vae.width * c.vae.mlp.max(3), self.features(), 4 * c.audio.features, c.vae.latent, c.flow.tau_width];
         let width = flow.into_iter().chain(rest).fold(audio, usize::max);
         // Voices are what is shared out whole.
-        Exec::new(self.kernels, threads, Limits { rows, width })?.with_workers(Limits { rows, width: audio })
+        Exec::new(self.kernels, threads, width)?.with_workers(audio)
     }
 }
 

@@ -31,8 +31,7 @@ pub enum ErrorKind {
     State,
 }
 
-/// An error with its kind, its subject (a file, when there is one) and a message that tells what to
-/// do.
+/// An error: its kind, its subject (a file, if any) and a message that tells what to do.
 #[derive(Debug)]
 pub struct Error {
     kind: ErrorKind,

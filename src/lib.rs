@@ -1,4 +1,15 @@
 #![doc = include_str!("../docs/crate.md")]
+//! # Names
+//!
+//! - a bundle: [`Engine`], [`Networks`], [`BundleFile`], [`LoadMode`]; its skeleton [`Rig`],
+//!   [`Joint`], and [`openxr`]'s
+//! - a conversation: [`Session`], [`SessionOptions`], [`Sampler`], [`EulerSteps`], [`Governor`],
+//!   [`Budget`]; several: [`Team`]
+//! - other threads: [`VoiceInput`], [`Speaker`], [`HeadInput`], [`Controls`], [`SharedSession`],
+//!   [`threads`]
+//! - what comes out: [`Frame`], [`Root`], [`Transform`]; vectors and rotations of `glam`
+//! - constants: [`FPS`], [`BLOCK_FRAMES`], [`SAMPLE_RATE`]
+//! - what happened: [`stats`], [`replay`]; [`Error`], [`ErrorKind`], [`Result`]
 #![cfg_attr(visavis_rtsan, feature(sanitize))]
 #![cfg_attr(
     not(feature = "internals"),
@@ -47,13 +58,14 @@ pub mod stats {
     pub use crate::user::TrackStats;
 }
 
-/// The governor's decisions, to record ([`Session::decisions`]) and to replay
-/// ([`Governor::Replay`]).
+/// The governor's decisions, to record and to replay.
+///
+/// [`Session::decisions`] records them, [`Governor::Replay`] goes by them.
 pub mod replay {
     pub use crate::session::{Decision, Hold, Plan};
 }
 
-/// The body joints of OpenXR's tracking extensions, and the rig's joint that each of them follows.
+/// The rig's joints as OpenXR's body tracking extensions number them.
 pub mod openxr {
     pub use crate::pose::openxr::{FB_BODY_JOINTS, OPENXR_JOINTS, openxr_joint};
 }

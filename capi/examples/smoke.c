@@ -1,22 +1,10 @@
 /* Every function of visavis.h, used as a program would and as it should not. Arguments: the bundle. Exit code 0 when all is well. */
-#include "visavis.h"
+#include "check.h"
 #include <fcntl.h>
 #include <math.h>
 #include <pthread.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-#define CHECK(condition)                                                                                              \
-    do {                                                                                                              \
-        if (!(condition)) {                                                                                           \
-            fprintf(stderr, "%s:%d: %s (last error: %s)\n", __FILE__, __LINE__, #condition, visavis_last_error());     \
-            exit(1);                                                                                                  \
-        }                                                                                                             \
-    } while (0)
-#define OK(call) CHECK((call) == VISAVIS_STATUS_OK)
-#define REFUSED(status, call) CHECK((call) == VISAVIS_STATUS_##status && visavis_last_error()[0] != '\0')
 
 static char *read_all(const char *path, size_t *length) {
     FILE *file = fopen(path, "rb");

@@ -177,8 +177,8 @@ typedef struct visavis_session_options {
     int32_t sampler_kind;
     // Steps of the sampler; default 4.
     uint32_t sampler_steps;
-    // Gaze target, 0 (averted) to 1 (sustained eye contact), negative to -1; NaN (default): what
-    // comes naturally.
+    // Gaze target, -1 to 1 (0 is averted, 1 sustained eye contact); NaN (default): what comes
+    // naturally.
     float gaze;
     // Guidance weight, 0 to 20; NaN (default): the bundle's.
     float guidance;
@@ -420,7 +420,8 @@ visavis_status visavis_session_set_audio_present(struct visavis_session *session
 // impossible are ignored and counted (visavis_stats). From any thread.
 visavis_status visavis_session_push_user_head(struct visavis_session *session, float x, float y, float z, double time);
 
-// Sets the gaze target from the next block on: 0 averted, 1 sustained eye contact.
+// Sets the gaze target from the next block on, -1 to 1: 0 is averted, 1 sustained eye
+// contact.
 visavis_status visavis_session_set_gaze(struct visavis_session *session, float target);
 
 // Leaves the gaze to the model from the next block on.

@@ -34,8 +34,8 @@ pub struct VisavisSessionOptions {
     pub sampler_kind: i32,
     /// Steps of the sampler; default 4.
     pub sampler_steps: u32,
-    /// Gaze target, 0 (averted) to 1 (sustained eye contact), negative to -1; NaN (default): what
-    /// comes naturally.
+    /// Gaze target, -1 to 1 (0 is averted, 1 sustained eye contact); NaN (default): what comes
+    /// naturally.
     pub gaze: f32,
     /// Guidance weight, 0 to 20; NaN (default): the bundle's.
     pub guidance: f32,

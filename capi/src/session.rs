@@ -199,7 +199,8 @@ pub unsafe extern "C" fn visavis_session_push_user_head(
     unsafe { around(session, tell) }
 }
 
-/// Sets the gaze target from the next block on: 0 averted, 1 sustained eye contact.
+/// Sets the gaze target from the next block on, -1 to 1: 0 is averted, 1 sustained eye
+/// contact.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_set_gaze(session: *mut VisavisSession, target: f32) -> VisavisStatus {
     // SAFETY: the header's promise.

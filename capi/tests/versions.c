@@ -1,20 +1,8 @@
 /* A program and a library of two versions. The program knows the structs of its header, which are smaller than the library's, or larger
  * (compiled with -DNEWER). Arguments: the bundle, and `same`, `older` or `newer`: what the library is. */
-#include "visavis.h"
+#include "../examples/check.h"
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-
-#define CHECK(condition)                                                                                              \
-    do {                                                                                                              \
-        if (!(condition)) {                                                                                           \
-            fprintf(stderr, "%s:%d: %s (last error: %s)\n", __FILE__, __LINE__, #condition, visavis_last_error());     \
-            exit(1);                                                                                                  \
-        }                                                                                                             \
-    } while (0)
-#define OK(call) CHECK((call) == VISAVIS_STATUS_OK)
-#define REFUSED(status, call) CHECK((call) == VISAVIS_STATUS_##status && visavis_last_error()[0] != '\0')
 
 /* Room behind a struct, which nobody may write to. */
 #define BEYOND 64

@@ -64,10 +64,10 @@ impl AudioEncoder {
         Ok(Self { inputs, hidden: vec![0.0; BLOCK_FRAMES * last], windows: vec![0.0; GATHER * window] })
     }
 
-    /// The `rows` and `width` that an [`Exec`] must allow for (see its limits) to run this encoder.
-    pub fn limits(config: &AudioConfig) -> (usize, usize) {
+    /// The width that an [`Exec`] must have to run this encoder.
+    pub fn width(config: &AudioConfig) -> usize {
         let widths = config.layers.iter().map(|c| (c.kernel * c.inputs).max(c.outputs));
-        (BLOCK_FRAMES * FRAME_SAMPLES, widths.max().unwrap_or(1).max(config.features))
+        widths.max().unwrap_or(1).max(config.features)
     }
 
     /// Back to the start of a signal: zeros on the left.

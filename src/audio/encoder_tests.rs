@@ -4,7 +4,7 @@ use super::tests::noise;
 use super::*;
 use crate::config::{AudioConfig, ConvConfig};
 use crate::error::ErrorKind;
-use crate::kernels::{Exec, Kernels, Limits, WeightData, Weights};
+use crate::kernels::{Exec, Kernels, WeightData, Weights};
 use proptest::prelude::*;
 
 fn config(layers: &[(usize, usize, usize, usize, bool)], features: usize) -> AudioConfig {
@@ -108,8 +108,7 @@ impl Net {
 }
 
 fn exec(config: &AudioConfig, threads: usize) -> Exec {
-    let (rows, width) = AudioEncoder::limits(config);
-    Exec::new(Kernels::detect().unwrap(), threads, Limits { rows, width }).unwrap()
+    Exec::new(Kernels::detect().unwrap(), threads, AudioEncoder::width(config)).unwrap()
 }
 
 /// Runs `samples` through in pieces of `frames` frames.

@@ -54,18 +54,18 @@ impl TryFrom<i32> for Speaker {
     }
 }
 
-/// A voice's input: pushes into a session from any thread, also while that session computes a
-/// block.
+/// A voice's input: pushes sound into a session from any thread.
 ///
-/// Nothing here waits for a block or for another thread, and nothing but the first push of a voice,
-/// or of another rate, allocates ([`VoiceInput::prepare`] does so ahead). A block hears what was
-/// pushed before its poll began.
+/// Also while that session computes a block: nothing here waits for a block or for another thread,
+/// and nothing but the first push of a voice, or of another rate, allocates
+/// ([`VoiceInput::prepare`] does so ahead). A block hears what was pushed before its poll began.
 ///
 /// A voice is one stream: sound stands in the order in which it was pushed, and how it was cut does
 /// not matter. So one thread pushes a voice's sound; commands may come from others. Should two
 /// threads push sound at the same moment, both are heard, one after the other, in pieces. While one
 /// thread is inside and has lost its core, what others push is kept, 480 pushes of up to 256
-/// samples; what is more is dropped and counted ([`crate::VoiceStats::contended_samples`]).
+/// samples; what is more is dropped and counted
+/// ([`VoiceStats::contended_samples`](super::VoiceStats::contended_samples)).
 #[derive(Clone)]
 pub struct VoiceInput {
     shared: Arc<Shared>,

@@ -4,7 +4,7 @@
 use crate::bundle::Tensors;
 use crate::config::FlowConfig;
 use crate::error::{Error, ErrorKind, Result};
-use crate::kernels::{Epilogue, Exec, Kernels, Limits, Matrix, RowTable};
+use crate::kernels::{Epilogue, Exec, Kernels, Matrix, RowTable};
 use crate::nn::{LayerNorms, Norms};
 use std::sync::Arc;
 
@@ -57,7 +57,7 @@ impl Modulator {
             last: linear("final.mod", 2 * d)?,
         };
         let Some(times) = times else { return Ok(Self::Weights(Box::new(weights))) };
-        let mut exec = Exec::new(kernels, 1, Limits { rows: times.len(), width })?;
+        let mut exec = Exec::new(kernels, 1, width)?;
         // As where sessions tabulate: denormals are zero.
         exec.begin();
         let table = weights.tabulate(&mut exec, c, times);

@@ -2,8 +2,7 @@
 
 use crate::error::{Error, ErrorKind, Result};
 
-/// How a block was made: the rule that carries noise to a latent, and its number of network
-/// evaluations.
+/// How a block is made: the rule from noise to a latent, and its number of evaluations.
 ///
 /// Every value is a sampler that exists: [`Sampler::midpoint`], [`Sampler::euler`] and
 /// [`str::parse`] refuse all others.

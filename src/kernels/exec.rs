@@ -11,16 +11,6 @@ use super::rows::{Disjoint, RowTable, by_rows};
 use crate::error::{Error, ErrorKind, Result};
 use crate::par::{FlushToZero, Pool};
 
-/// Sizes that scratch is allocated for.
-#[derive(Debug, Clone, Copy)]
-pub struct Limits {
-    /// Rows of a call, typically; more are worked through in portions of 16.
-    #[cfg_attr(not(feature = "internals"), expect(dead_code))]
-    pub rows: usize,
-    /// Largest `in_features` of any matrix.
-    pub width: usize,
-}
-
 /// Kernels, threads and scratch of one session.
 ///
 /// After [`new`](Self::new) no method allocates, locks or enters the kernel, but for
@@ -44,12 +34,13 @@ pub struct Exec {
 }
 
 impl Exec {
-    /// Allocates scratch and, for `threads` = 2, starts the helper thread.
+    /// Allocates scratch for matrices of up to `width` `in_features` (and any number of rows) and,
+    /// for `threads` = 2, starts the helper thread.
     ///
     /// # Errors
     /// [`ErrorKind::Argument`] when `threads` is not 1 or 2; [`ErrorKind::Io`] when the thread
     /// cannot be started.
-    pub fn new(kernels: Kernels, threads: usize, limits: Limits) -> Result<Exec> {
+    pub fn new(kernels: Kernels, threads: usize, width: usize) -> Result<Exec> {
         if !(1..=2).contains(&threads) {
             return Err(Error::new(ErrorKind::Argument, format!("threads = {threads}: use 1 or 2")));
         }
@@ -58,7 +49,7 @@ impl Exec {
         Ok(Exec {
             kernels,
             pool,
-            scratch: Scratch::new(limits.width),
+            scratch: Scratch::new(width),
             upcoming: None,
             flush: None,
             activations: None,

@@ -99,7 +99,7 @@ fn linear_matches_f64_and_has_the_same_bits_everywhere() {
                         (out, cols, scheme)
                     );
                     for threads in [1, 2] {
-                        let mut exec = Exec::new(kernels, threads, Limits { rows, width: cols }).unwrap();
+                        let mut exec = Exec::new(kernels, threads, cols).unwrap();
                         let mut y = y0.clone();
                         exec.begin();
                         exec.linear(&m, &x, rows, &mut y, e);
@@ -173,7 +173,7 @@ fn extreme_scales_have_the_same_bits_everywhere() {
             for kernels in levels() {
                 let m = kernels.pack(Weights { rows: out, cols, data }, None);
                 let m = if split { m.with_int16_activations() } else { m };
-                let mut exec = Exec::new(kernels, 1, Limits { rows: 6, width: cols }).unwrap();
+                let mut exec = Exec::new(kernels, 1, cols).unwrap();
                 let mut y = vec![0.5; 6 * out];
                 exec.linear(&m, &x[1..], 6, &mut y, Epilogue::Store);
                 assert!(y[..out].iter().all(|v| *v == 0.0), "a row of zeros gives zeros: {exec:?}");
@@ -191,7 +191,7 @@ fn zero_and_broken_rows() {
         let (q, scale) = ([-128i8; 40], [f32::MAX / 1e6]);
         let m =
             kernels.pack(Weights { rows: 1, cols: 40, data: WeightData::I8 { q: &q, scale: &scale } }, Some(&[3.0]));
-        let mut exec = Exec::new(kernels, 1, Limits { rows: 3, width: 40 }).unwrap();
+        let mut exec = Exec::new(kernels, 1, 40).unwrap();
         let mut x = [0.0; 120];
         x[40] = 1e-38;
         x[90] = f32::NAN;
@@ -230,7 +230,7 @@ fn attention_matches_f64_over_wrapped_rings() {
             let mut first: Option<Vec<u32>> = None;
             for kernels in levels() {
                 for threads in [1, 2] {
-                    let mut exec = Exec::new(kernels, threads, Limits { rows, width: dim }).unwrap();
+                    let mut exec = Exec::new(kernels, threads, dim).unwrap();
                     let mut y = vec![9.0; rows * dim];
                     exec.begin();
                     exec.attend(&q, stride, &cache, &spans, &mut y);
@@ -281,7 +281,7 @@ fn norm_and_rope_take_a_vector_for_each_row() {
     let cos: Vec<f32> = angles.iter().map(|a| a.cos()).collect();
     let sin: Vec<f32> = angles.iter().map(|a| a.sin()).collect();
     for kernels in levels() {
-        let mut exec = Exec::new(kernels, 1, Limits { rows, width: dim }).unwrap();
+        let mut exec = Exec::new(kernels, 1, dim).unwrap();
         let mut y = vec![0.0; rows * dim];
         exec.norm(&x, rows, dim, shift, scale, &mut y);
         let mut z = x.clone();
@@ -323,7 +323,7 @@ fn sessions_can_move_between_threads() {
 fn a_wrong_number_of_threads_is_an_argument_error() {
     let kernels = Kernels::with_level(Level::Scalar).unwrap();
     for threads in [0, 3] {
-        let e = Exec::new(kernels, threads, Limits { rows: 1, width: 1 }).unwrap_err();
+        let e = Exec::new(kernels, threads, 1).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::Argument);
     }
 }

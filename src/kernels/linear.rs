@@ -67,7 +67,7 @@ impl Scratch {
     ) {
         assert_eq!(x.len(), rows * w.cols, "linear: x is rows x in_features");
         assert_eq!(y.len(), rows * w.out, "linear: y is rows x out_features");
-        assert!(w.cols <= self.width, "linear: in_features within Limits::width");
+        assert!(w.cols <= self.width, "linear: in_features within the width of Exec::new");
         let most = if w.split { MAX_ROWS / 2 } else { MAX_ROWS };
         for start in (0..rows).step_by(most) {
             let n = most.min(rows - start);

@@ -111,7 +111,7 @@ mod workers;
 pub use crate::scheme::Scheme;
 pub use activations::Activations;
 pub use attend::{KvCache, KvDtype, Span};
-pub use exec::{Exec, Limits};
+pub use exec::Exec;
 pub use level::Level;
 pub use linear::Epilogue;
 pub use matrix::Matrix;

@@ -1,18 +1,18 @@
 //! Things that networks are run on, shared out whole: each to one thread, which has an [`Exec`] of
 //! its own.
 
-use super::{Exec, Limits};
+use super::Exec;
 use crate::error::Result;
 use crate::par::Pool;
 
 impl Exec {
-    /// The same with scratch of `limits` for each of two threads, if it has two: [`Exec::each`]
-    /// shares out what keeps within them.
+    /// The same with scratch for matrices of `width` for each of two threads, if it has two:
+    /// [`Exec::each`] shares out what keeps within it.
     ///
     /// # Errors
     /// As [`Exec::new`].
-    pub fn with_workers(mut self, limits: Limits) -> Result<Self> {
-        let worker = || Exec::new(self.kernels, 1, limits);
+    pub fn with_workers(mut self, width: usize) -> Result<Self> {
+        let worker = || Exec::new(self.kernels, 1, width);
         self.workers = if self.threads() == 2 { Some(Box::new([worker()?, worker()?])) } else { None };
         Ok(self)
     }
@@ -48,14 +48,13 @@ mod tests {
     fn shared_out_or_not_the_bits_are_the_same() {
         const ROWS: usize = 40;
         let (cols, out) = (70, 100);
-        let limits = Limits { rows: ROWS, width: cols };
         let mut random = Random(5);
         let (q, scale) = (random.bytes(out * cols), vec![0.01; out]);
         let inputs: Vec<_> = (0..9).map(|_| random.floats(ROWS * cols, 2.0)).collect();
         for kernels in levels() {
             let data = WeightData::I8 { q: &q, scale: &scale };
             let w = kernels.pack(Weights { rows: out, cols, data }, None);
-            let mut alone = Exec::new(kernels, 1, limits).unwrap();
+            let mut alone = Exec::new(kernels, 1, cols).unwrap();
             let expected = inputs.iter().map(|x| {
                 let mut y = vec![0.0; ROWS * out];
                 alone.linear(&w, x, ROWS, &mut y, Epilogue::Gelu);
@@ -63,7 +62,7 @@ mod tests {
             });
             let expected: Vec<_> = expected.collect();
             for threads in [1, 2] {
-                let mut exec = Exec::new(kernels, threads, limits).unwrap().with_workers(limits).unwrap();
+                let mut exec = Exec::new(kernels, threads, cols).unwrap().with_workers(cols).unwrap();
                 for count in 0..inputs.len() {
                     let mut items: Vec<_> = inputs[..count].iter().map(|x| (x, vec![0.0; ROWS * out])).collect();
                     exec.begin();

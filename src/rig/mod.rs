@@ -25,8 +25,9 @@ pub struct Joint {
     pub offset: [f32; 3],
 }
 
-/// The skeleton: joints with parents before children. At rest it stands in a T-pose facing +Z, all
-/// rotations identity.
+/// The skeleton: joints with parents before children.
+///
+/// At rest it stands in a T-pose facing +Z, all rotations identity.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Rig {
     /// Joints, parents before children.

@@ -8,7 +8,9 @@ use crate::error::{Error, Result};
 use crate::flow::Guidance;
 use crate::frame::{Root, Sampler};
 
-/// Options of a session. Start from `SessionOptions::default()` and change what is needed:
+/// Options of a session.
+///
+/// Start from `SessionOptions::default()` and change what is needed:
 /// `SessionOptions { gaze: Some(0.8), ..Default::default() }`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionOptions {
@@ -23,7 +25,7 @@ pub struct SessionOptions {
     pub sampler: Sampler,
     /// Who chooses the sampler of each block.
     pub governor: Governor,
-    /// Gaze target, -1 to 1, or `None` for free gaze.
+    /// Gaze target, -1 to 1 (0 is averted, 1 sustained eye contact), or `None` for free gaze.
     pub gaze: Option<f32>,
     /// Guidance weight, 0 to 20; `None` for the bundle's.
     pub guidance: Option<f32>,

@@ -8,8 +8,8 @@ use crate::error::Result;
 use crate::frame::Sampler;
 
 impl Session {
-    /// Sets the gaze target, 0 (averted) to 1 (sustained eye contact), or `None` for free gaze:
-    /// levels of recorded conversations, another one every now and then, where the bundle was
+    /// Sets the gaze target, -1 to 1 (0 is averted, 1 sustained eye contact), or `None` for free
+    /// gaze: levels of recorded conversations, another one every now and then, where the bundle was
     /// calibrated, else what the model finds natural. Takes effect with the next block. The first
     /// target takes the memory of its guidance branch, a copy of some megabytes.
     ///

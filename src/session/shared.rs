@@ -5,8 +5,9 @@ use crate::audio::{Speaker, VoiceInput};
 use crate::user::HeadInput;
 use std::sync::{LockResult, Mutex, MutexGuard, TryLockResult};
 
-/// A session with its inputs and controls side by side, to be shared by threads (in an
-/// [`std::sync::Arc`], or by a handle of another language).
+/// A session with its inputs and controls side by side, for threads to share.
+///
+/// In an [`std::sync::Arc`], or by a handle of another language.
 ///
 /// Pushes and settings never wait: they go around the session. What needs the session itself
 /// (polls, resets, statistics) takes turns, by [`SharedSession::lock`] or

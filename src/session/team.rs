@@ -12,7 +12,7 @@ use crate::kernels::Exec;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// What it takes to step several sessions of one engine together: threads and working memory.
+/// Steps several sessions of one engine together: threads and working memory.
 ///
 /// Reading the weights is most of a block's time. Sessions whose blocks are due at the same time,
 /// and made by the same sampler with history at the same flow times, go through the flow network

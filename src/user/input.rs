@@ -13,13 +13,13 @@ const WORDS: usize = 3;
 /// Attempts to make room before a sample is given up: more than that many other threads are at it.
 const ATTEMPTS: usize = 8;
 
-/// The input of the user's head: tells where it is from any thread, also while the session computes
-/// a block.
+/// The input of the user's head: tells where it is, from any thread.
 ///
-/// Nothing here waits or allocates. A block knows what was pushed before its poll began. Samples
-/// are put in order by their time stamps, whichever thread they come from: the same samples give
-/// the same bits. Up to 8192 (68 s at 120 Hz) wait for the next poll; beyond that the oldest are
-/// dropped and counted ([`super::TrackStats::overwritten`]).
+/// Also while the session computes a block: nothing here waits or allocates. A block knows what was
+/// pushed before its poll began. Samples are put in order by their time stamps, whichever thread
+/// they come from: the same samples give the same bits. Up to 8192 (68 s at 120 Hz) wait for the
+/// next poll; beyond that the oldest are dropped and counted
+/// ([`TrackStats::overwritten`](super::TrackStats::overwritten)).
 #[derive(Clone)]
 pub struct HeadInput {
     shared: Arc<Shared>,

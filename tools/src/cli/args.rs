@@ -50,9 +50,9 @@ pub struct Gaze(pub Option<f32>);
 
 #[derive(Debug, Clone, Args)]
 pub struct RunArgs {
-    /// How much the agent looks at the user, 0 (averted) to 1 (sustained eye contact), or off for
-    /// what comes naturally
-    #[arg(long, value_name = "0..1|off", value_parser = gaze, default_value = "off", allow_negative_numbers = true)]
+    /// How much the agent looks at the user, -1 to 1: 0 is averted, 1 sustained eye contact; or off
+    /// for what comes naturally
+    #[arg(long, value_name = "-1..1|off", value_parser = gaze, default_value = "off", allow_negative_numbers = true)]
     pub gaze: Gaze,
     /// midpoint4, midpoint2, midpoint1, euler:N or single
     #[arg(long, value_name = "NAME", default_value = "midpoint4")]
@@ -189,7 +189,7 @@ fn gaze(text: &str) -> Result<Gaze, String> {
     if text == "off" {
         return Ok(Gaze(None));
     }
-    number(text, 0.0, 1.0).map(|g| Gaze(Some(g))).map_err(|e| format!("{e}, or off"))
+    number(text, -1.0, 1.0).map(|g| Gaze(Some(g))).map_err(|e| format!("{e}, or off"))
 }
 
 pub(super) fn weight(text: &str) -> Result<f32, String> {

@@ -4,7 +4,7 @@
 use super::spread::{Spread, cosine, sqnr};
 use serde::{Deserialize, Serialize};
 use visavis::internals::bundle::StoredWeights;
-use visavis::internals::kernels::{Activations, Epilogue, Exec, Kernels, Limits, Matrix, Scheme};
+use visavis::internals::kernels::{Activations, Epilogue, Exec, Kernels, Matrix, Scheme};
 use visavis::internals::quant::{Forced, Layer, Scene, Teacher, layers};
 use visavis::{BundleFile, Engine, Result};
 
@@ -182,7 +182,7 @@ fn tensors(candidate: &Loaded, layers: &[Layer], activations: &Activations) -> R
 fn product(w: &Matrix, kernels: Kernels, x: &[f32], rows: usize) -> Vec<f32> {
     let mut y = vec![0.0; rows * w.out_features()];
     // One thread needs nothing from the system, so this does not fail.
-    if let Ok(mut exec) = Exec::new(kernels, 1, Limits { rows, width: w.in_features() }) {
+    if let Ok(mut exec) = Exec::new(kernels, 1, w.in_features()) {
         exec.linear(w, x, rows, &mut y, Epilogue::Store);
     }
     y

@@ -68,13 +68,13 @@ fn wrong_usage_is_exit_code_two() {
     let wav = text(&scratch.file("good.wav", tone(16_000, 0.2)));
     for (args, part) in [
         (&["--agent", &wav, "--smile", "1"][..], "--smile"),
-        (&["--agent", &wav, "--gaze", "1.5"], "from 0 to 1, or off"),
-        (&["--agent", &wav, "--gaze", "yes"], "from 0 to 1, or off"),
+        (&["--agent", &wav, "--gaze", "1.5"], "from -1 to 1, or off"),
+        (&["--agent", &wav, "--gaze", "yes"], "from -1 to 1, or off"),
         (&["--agent", &wav, "--sampler", "midpoint3"], "unknown sampler"),
         (&["--agent", &wav, "--sampler", "euler:0"], "unknown sampler"),
         (&["--agent", &wav, "--guidance", "NaN"], "from 0 to 20"),
         (&["--agent", &wav, "--threads", "3"], "1..=2"),
-        (&["--agent", &wav, "--gaze", "-0.5"], "from 0 to 1, or off"),
+        (&["--agent", &wav, "--gaze", "-1.5"], "from -1 to 1, or off"),
         (&["--agent", &wav, "--seed", "-1"], "--seed"),
         (&["--agent"], "--agent"),
         (&[], "--agent"),

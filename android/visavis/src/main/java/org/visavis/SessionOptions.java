@@ -47,7 +47,7 @@ public final class SessionOptions {
         return this;
     }
 
-    /** Gaze target, 0 (averted) to 1 (sustained eye contact); what comes naturally by default. */
+    /** Gaze target, -1 to 1 (0 is averted, 1 sustained eye contact); what comes naturally by default. */
     @NonNull
     public SessionOptions gaze(float target) {
         this.gaze = checked("gaze target", target);

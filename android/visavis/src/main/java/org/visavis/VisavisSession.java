@@ -99,7 +99,7 @@ public final class VisavisSession implements AutoCloseable {
     }
 
     /**
-     * Sets the gaze target from the next block on: 0 averted, 1 sustained eye contact.
+     * Sets the gaze target from the next block on, -1 to 1: 0 is averted, 1 sustained eye contact.
      *
      * @throws IllegalArgumentException outside -1 to 1
      */
