@@ -11,17 +11,21 @@ if ! command -v cc >/dev/null; then
   DEBIAN_FRONTEND=noninteractive apt-get -qq install -y --no-install-recommends gcc libc6-dev >/dev/null
 fi
 
+# What features of its dependencies the library is built with goes by all packages of a command: with these two it is the same here and in
+# android/check.sh, and built once.
+faces=(--quiet --release -p visavis-capi -p visavis-android)
 echo '-- tests: header, layouts, C#'
 cargo test --quiet -p visavis-header
-cargo test --quiet --release -p visavis-capi
+cargo test "${faces[@]}"
 target=$(cargo metadata --no-deps --format-version 1 | sed 's/.*"target_directory":"\([^"]*\)".*/\1/')
 out=$target/capi
 mkdir -p "$out/next"
 echo '-- library, and one of the next version, whose structs have grown'
-cargo build --quiet --release -p visavis-capi --features grown
+cargo build "${faces[@]}" --features visavis-capi/grown
 cp "$target/release/libvisavis_c.so" "$out/next/"
-cargo run --quiet -p visavis-header -- "$out/next/visavis.h"
-cargo build --quiet --release -p visavis-capi
+# In the profile of its test, which has built the generator.
+cargo run --quiet --profile test -p visavis-header -- "$out/next/visavis.h"
+cargo build "${faces[@]}"
 
 echo '-- header alone: C and, where there is a compiler, C++'
 cc -x c -Wall -Wextra -Werror -pedantic -fsyntax-only -include capi/include/visavis.h - </dev/null

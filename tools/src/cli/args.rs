@@ -2,6 +2,7 @@
 
 use super::quantize::QuantizeArgs;
 use super::report::ReportArgs;
+use super::values::{Gaze, GuidanceArgs, gaze};
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -44,10 +45,6 @@ pub enum Command {
     Trace(TraceArgs),
 }
 
-/// A gaze target, or `off`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gaze(pub Option<f32>);
-
 #[derive(Debug, Clone, Args)]
 pub struct RunArgs {
     /// How much the agent looks at the user, -1 to 1: 0 is averted, 1 sustained eye contact; or off
@@ -57,12 +54,8 @@ pub struct RunArgs {
     /// midpoint4, midpoint2, midpoint1, euler:N or single
     #[arg(long, value_name = "NAME", default_value = "midpoint4")]
     pub sampler: Sampler,
-    /// Guidance weight, 0 to 20 (1 is none) [default: the model's]
-    #[arg(long, value_name = "W", value_parser = weight, allow_negative_numbers = true)]
-    pub guidance: Option<f32>,
-    /// Gaze guidance weight, 0 to 20 [default: the model's]
-    #[arg(long, value_name = "W", value_parser = weight, allow_negative_numbers = true)]
-    pub gaze_guidance: Option<f32>,
+    #[command(flatten)]
+    pub weights: GuidanceArgs,
     /// Bundle [default: the shipped one, in models/ here, beside the program, or in its source
     /// folder]
     #[arg(long, value_name = "FILE")]
@@ -129,12 +122,8 @@ pub struct TraceArgs {
     /// midpoint4, midpoint2, midpoint1, euler:N or single
     #[arg(long, value_name = "NAME", default_value = "midpoint4")]
     pub sampler: Sampler,
-    /// Guidance weight, 0 to 20 (1 is none) [default: the model's]
-    #[arg(long, value_name = "W", value_parser = weight, allow_negative_numbers = true)]
-    pub guidance: Option<f32>,
-    /// Gaze guidance weight, 0 to 20 [default: the model's]
-    #[arg(long, value_name = "W", value_parser = weight, allow_negative_numbers = true)]
-    pub gaze_guidance: Option<f32>,
+    #[command(flatten)]
+    pub weights: GuidanceArgs,
     /// Seed of the noise where the input gives none
     #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     pub seed: u64,
@@ -158,8 +147,8 @@ impl RunArgs {
             threads: self.threads,
             sampler: self.sampler,
             gaze: self.gaze.0,
-            guidance: self.guidance,
-            gaze_guidance: self.gaze_guidance,
+            guidance: self.weights.guidance,
+            gaze_guidance: self.weights.gaze_guidance,
             ..SessionOptions::default()
         }
     }
@@ -174,32 +163,14 @@ impl RunArgs {
             ("about the model", config.description.clone()),
             ("sampler", self.sampler.to_string()),
             ("gaze target", gaze),
-            ("guidance", self.guidance.unwrap_or(defaults.guidance).to_string()),
-            ("gaze guidance", self.gaze_guidance.unwrap_or(defaults.gaze_guidance).to_string()),
+            ("guidance", self.weights.guidance.unwrap_or(defaults.guidance).to_string()),
+            ("gaze guidance", self.weights.gaze_guidance.unwrap_or(defaults.gaze_guidance).to_string()),
             ("seed", self.seed.to_string()),
             ("kernels", engine.kernels().level().to_string()),
             ("made by", format!("visavis {}", env!("CARGO_PKG_VERSION"))),
             ("licence of the model", config.licence.clone()),
         ];
         facts.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
-    }
-}
-
-fn gaze(text: &str) -> Result<Gaze, String> {
-    if text == "off" {
-        return Ok(Gaze(None));
-    }
-    number(text, -1.0, 1.0).map(|g| Gaze(Some(g))).map_err(|e| format!("{e}, or off"))
-}
-
-pub(super) fn weight(text: &str) -> Result<f32, String> {
-    number(text, 0.0, 20.0)
-}
-
-pub(super) fn number(text: &str, low: f32, high: f32) -> Result<f32, String> {
-    match text.parse() {
-        Ok(value) if (low..=high).contains(&value) => Ok(value),
-        _ => Err(format!("it is a number from {low} to {high}")),
     }
 }
 
@@ -213,14 +184,5 @@ mod tests {
         Cli::command().debug_assert();
         assert_eq!(DemoArgs::default().out, PathBuf::from("out/demo"));
         assert_eq!(DemoArgs::default().run.options(), SessionOptions::default());
-    }
-
-    #[test]
-    fn values_out_of_range_are_refused() {
-        for bad in ["-0.1", "1.1", "NaN", "on", ""] {
-            assert!(gaze(bad).is_err(), "{bad}");
-        }
-        assert_eq!((gaze("off"), gaze("0.8")), (Ok(Gaze(None)), Ok(Gaze(Some(0.8)))));
-        assert!(weight("20.5").is_err() && weight("inf").is_err());
     }
 }

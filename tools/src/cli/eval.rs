@@ -1,6 +1,6 @@
 //! `visavis eval`: a bundle judged on recorded conversations.
 
-use super::args::{number, weight};
+use super::values::{GuidanceArgs, number};
 use super::{files, print};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
@@ -33,12 +33,8 @@ pub struct EvalArgs {
     /// Samplers, the reference first [default: midpoint4 midpoint2 midpoint1 single]
     #[arg(long, value_name = "NAME", num_args = 1..)]
     pub sampler: Vec<Sampler>,
-    /// Guidance weight, 0 to 20 (1 is none) [default: the model's]
-    #[arg(long, value_name = "W", value_parser = weight, allow_negative_numbers = true)]
-    pub guidance: Option<f32>,
-    /// Gaze guidance weight, 0 to 20 [default: the model's]
-    #[arg(long, value_name = "W", value_parser = weight, allow_negative_numbers = true)]
-    pub gaze_guidance: Option<f32>,
+    #[command(flatten)]
+    pub weights: GuidanceArgs,
     /// Scale of the noise, 0 to 2 [default: the model's]
     #[arg(long, value_name = "T", value_parser = temperature, allow_negative_numbers = true)]
     pub temperature: Option<f32>,
@@ -71,8 +67,8 @@ pub fn run(args: &EvalArgs) -> Result<()> {
         motion_only: args.motion_only,
         seed: args.seed,
         session: SessionOptions {
-            guidance: args.guidance,
-            gaze_guidance: args.gaze_guidance,
+            guidance: args.weights.guidance,
+            gaze_guidance: args.weights.gaze_guidance,
             temperature: args.temperature,
             ..SessionOptions::default()
         },

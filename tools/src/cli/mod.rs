@@ -17,6 +17,7 @@ mod quantize;
 mod report;
 mod soak;
 mod trace;
+mod values;
 
 use args::{Cli, Command, DemoArgs};
 use clap::Parser;

@@ -14,8 +14,8 @@ pub fn run(args: &TraceArgs) -> Result<()> {
     let options = SessionOptions {
         seed: args.seed,
         sampler: args.sampler,
-        guidance: args.guidance,
-        gaze_guidance: args.gaze_guidance,
+        guidance: args.weights.guidance,
+        gaze_guidance: args.weights.gaze_guidance,
         stance: false,
         guard: false,
         diagnostics: Diagnostics {
