@@ -54,7 +54,7 @@ impl Error {
         Self {
             kind: ErrorKind::Io,
             path: Some(path.as_ref().to_path_buf()),
-            message: format!("cannot {what}: {source}"),
+            message: format!("cannot {what}: {source}{}", advice(&source)),
             source: Some(Box::new(source)),
         }
     }
@@ -74,6 +74,30 @@ impl Error {
     /// The file that the error is about, if it is about one.
     pub fn path(&self) -> Option<&Path> {
         self.path.as_deref()
+    }
+}
+
+/// What to do where the system's own words do not tell: Windows refuses to open, change or replace
+/// files that other programs hold, which other systems do not.
+fn advice(source: &std::io::Error) -> &'static str {
+    if !cfg!(windows) {
+        return "";
+    }
+    const ACCESS_DENIED: i32 = 5;
+    const SHARING_VIOLATION: i32 = 32;
+    const LOCK_VIOLATION: i32 = 33;
+    const USER_MAPPED_FILE: i32 = 1224;
+    match source.raw_os_error() {
+        Some(SHARING_VIOLATION | LOCK_VIOLATION) => "; another program has the file open: close it there and try again",
+        Some(USER_MAPPED_FILE) => {
+            "; a program has the file mapped, as one that is loading a bundle has: close it there, or load with \
+             LoadMode::Copy, and try again"
+        }
+        Some(ACCESS_DENIED) => {
+            "; the folder or file is not this user's to write, is read-only, or is in use by another program: close \
+             it there or choose another folder"
+        }
+        _ => "",
     }
 }
 

@@ -1,10 +1,18 @@
 /* Every function of visavis.h, used as a program would and as it should not. Arguments: the bundle. Exit code 0 when all is well. */
 #include "check.h"
 #include <fcntl.h>
+#include <inttypes.h>
 #include <math.h>
 #include <pthread.h>
 #include <string.h>
 #include <unistd.h>
+
+/* Linux and Android number threads for performance hints and let them be pinned. */
+#ifdef __linux__
+#define HAS_THREAD_IDS 1
+#else
+#define HAS_THREAD_IDS 0
+#endif
 
 static char *read_all(const char *path, size_t *length) {
     FILE *file = fopen(path, "rb");
@@ -35,6 +43,9 @@ static void loading(const char *path) {
     REFUSED(BUNDLE_CORRUPT, visavis_engine_from_memory((const uint8_t *)bytes, length, &engine));
     free(bytes);
 
+#ifdef _WIN32
+    REFUSED(ARGUMENT, visavis_engine_from_fd(0, 0, 0, &engine));
+#else
     char apk[] = "/tmp/visavis-XXXXXX";
     int out = mkstemp(apk), in;
     bytes = read_all(path, &length);
@@ -50,6 +61,7 @@ static void loading(const char *path) {
     REFUSED(IO, visavis_engine_from_fd(in, 5, length, &engine));
     REFUSED(ARGUMENT, visavis_engine_from_fd(-1, 0, 0, &engine));
     unlink(apk);
+#endif
 
     REFUSED(IO, visavis_engine_from_path("/nowhere/model.safetensors", &engine));
     REFUSED(ARGUMENT, visavis_engine_from_path(NULL, &engine));
@@ -132,7 +144,7 @@ static uint64_t drive(const visavis_engine *engine, uint32_t threads, int blocks
     uint32_t ids[2];
     size_t id_count;
     OK(visavis_session_worker_thread_ids(session, ids, 2, &id_count));
-    CHECK(id_count == threads - 1);
+    CHECK(id_count == (HAS_THREAD_IDS ? threads - 1 : 0));
     OK(visavis_session_worker_thread_ids(session, NULL, 0, &id_count));
 
     /* Wrong uses of a live session. */
@@ -228,9 +240,9 @@ int main(int argc, char **argv) {
     CHECK(visavis_engine_openxr_joint(engine, 1000, VISAVIS_BODY_FB) == -1);
     CHECK(visavis_engine_joint_for_openxr(engine, 1) == 0 && visavis_engine_joint_for_openxr(engine, 0) == -1);
     CHECK(visavis_engine_joint_for_openxr(engine, 84) == -1);
-    OK(visavis_pin_current_thread(~0ull));
+    if (HAS_THREAD_IDS) OK(visavis_pin_current_thread(~0ull));
     REFUSED(ARGUMENT, visavis_pin_current_thread(0));
-    CHECK(visavis_current_thread_id() != 0);
+    CHECK((visavis_current_thread_id() != 0) == HAS_THREAD_IDS);
 
     /* The same motion with one thread, two threads, and two sessions at once on one engine. */
     uint64_t one = drive(engine, 1, 4), two = drive(engine, 2, 4), beside = 0;
@@ -270,6 +282,6 @@ int main(int argc, char **argv) {
     visavis_engine_free(NULL);
     REFUSED(ARGUMENT, visavis_session_reset(NULL));
     REFUSED(ARGUMENT, visavis_session_new(NULL, NULL, &contested));
-    printf("C smoke: all well; digest %016llx\n", (unsigned long long)one);
+    printf("C smoke: all well; digest %016" PRIx64 "\n", one);
     return 0;
 }

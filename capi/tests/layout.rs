@@ -1,7 +1,12 @@
-//! Layouts without padding, and the same in `examples/Visavis.cs`.
+//! Layouts without padding, and the same in C# (`unity/Runtime`).
 
 use std::mem::{align_of, size_of};
 use visavis_c::{VisavisFrame, VisavisJoint, VisavisSessionOptions, VisavisStats, VisavisVoiceStats};
+
+fn csharp(file: &str) -> String {
+    let path = format!("{}/unity/Runtime/{file}", env!("CARGO_MANIFEST_DIR"));
+    std::fs::read_to_string(path).expect("a file of the package")
+}
 
 /// Fields of a struct in the C# file, `(type, name)`, in order.
 fn fields(source: &str, name: &str) -> Vec<(String, String)> {
@@ -34,8 +39,7 @@ fn csharp_size(source: &str, name: &str) -> usize {
 #[cfg(not(feature = "grown"))]
 #[test]
 fn structs_have_no_padding_and_csharp_has_the_same() {
-    let source =
-        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/Visavis.cs")).expect("Visavis.cs");
+    let source = csharp("Structs.cs");
     for (name, size) in [
         ("SessionOptions", size_of::<VisavisSessionOptions>()),
         ("Frame", size_of::<VisavisFrame>()),
@@ -53,7 +57,7 @@ fn structs_have_no_padding_and_csharp_has_the_same() {
 #[test]
 fn csharp_has_the_functions_and_numbers_of_the_header() {
     let root = env!("CARGO_MANIFEST_DIR");
-    let source = std::fs::read_to_string(format!("{root}/examples/Visavis.cs")).expect("Visavis.cs");
+    let (source, structs) = (csharp("Native.cs"), csharp("Structs.cs"));
     let header = std::fs::read_to_string(format!("{root}/include/visavis.h")).expect("visavis.h");
     let names = |text: &str, code: fn(&str) -> bool| {
         let mut names: Vec<String> = (text.lines().filter(|l| code(l)))
@@ -79,7 +83,7 @@ fn csharp_has_the_functions_and_numbers_of_the_header() {
     {
         assert!(header.contains(&format!("VISAVIS_STATUS_{rust} = {number},")), "{rust}");
         let name: String = rust.split('_').map(|w| w[..1].to_owned() + &w[1..].to_lowercase()).collect();
-        assert!(source.contains(&format!("{name} = {number},")), "{name}");
+        assert!(structs.contains(&format!("{name} = {number},")), "{name}");
     }
     assert!(source.contains(&format!("AbiVersion = 0x{:x};", visavis_c::VISAVIS_ABI_VERSION)));
 }

@@ -1,5 +1,6 @@
 //! Files that appear whole or not at all.
 
+use super::replace::replace;
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -23,7 +24,7 @@ impl Drop for Temporary {
 
 /// Writes a file through `write` so that `path` is either the whole new file or what it was before:
 /// the bytes go to a hidden temporary file beside the target, are flushed to the disk, and the file
-/// is renamed. The temporary file is removed when anything fails, also when `write` panics.
+/// is renamed (on Windows a program that holds `path` open may forbid that). The temporary file is removed when anything fails, also when `write` panics.
 ///
 /// # Errors
 /// [`ErrorKind::Io`] naming `path`: the folder is missing or not writable, `path` is a folder, the
@@ -38,7 +39,7 @@ where
     let done = write(&mut writer)
         .and_then(|()| writer.into_inner().map_err(io::IntoInnerError::into_error))
         .and_then(|file| file.sync_all())
-        .and_then(|()| std::fs::rename(&temporary.path, path));
+        .and_then(|()| replace(&temporary.path, path));
     done.map_err(|e| Error::io("write the file", path, e))?;
     temporary.kept = true;
     Ok(())

@@ -13,6 +13,7 @@
 mod atomic;
 mod bvh;
 mod gltf;
+pub(crate) mod replace;
 #[cfg(test)]
 mod scratch;
 pub mod viewer;

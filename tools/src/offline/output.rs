@@ -1,5 +1,6 @@
 //! A folder of results that appear together, or not at all.
 
+use crate::export::replace::replace_all;
 use crate::export::viewer::{self, Meta};
 use crate::export::{write_atomically, write_motion};
 use crate::metrics::Summary;
@@ -78,9 +79,9 @@ impl OutputFolder {
 
     fn publish(mut self) -> Result<[PathBuf; 5]> {
         let paths = FILES.map(|name| self.folder.join(name));
-        for (name, path) in FILES.iter().zip(&paths) {
-            std::fs::rename(self.staging.join(name), path).map_err(|e| Error::io("write the file", path, e))?;
-        }
+        let pairs: Vec<_> =
+            FILES.iter().zip(&paths).map(|(name, path)| (self.staging.join(name), path.clone())).collect();
+        replace_all(&pairs, &self.staging).map_err(|(i, e)| Error::io("write the file", &paths[i], e))?;
         self.made.clear();
         Ok(paths)
     }

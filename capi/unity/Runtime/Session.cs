@@ -1,0 +1,124 @@
+using System;
+using System.Runtime.InteropServices;
+
+namespace Visavis
+{
+    /// <summary>One conversation. Session world: metres, seconds, right-handed, Y up; times count from 0 at its start.</summary>
+    /// <remarks>
+    /// Pushes, commands and settings come from any thread, such as OnAudioFilterRead and a tracker's. They never wait for Poll or for each other and are never
+    /// refused; a block goes by what came before its Poll began. One thread at a time pushes the sound of a voice. Poll, Reset, WarmUp and Statistics are one
+    /// thread's at a time, else BusyException. After Dispose: ObjectDisposedException; a call under way ends first.
+    /// </remarks>
+    public sealed class Session : IDisposable
+    {
+        /// <summary>Frames of a block.</summary>
+        public const int BlockFrames = 4;
+
+        /// <summary>Frames a second.</summary>
+        public const int Rate = 30;
+
+        readonly SessionHandle handle;
+
+        internal Session(SessionHandle handle, int joints)
+        {
+            this.handle = handle;
+            JointCount = joints;
+            Joints = new Joint[BlockFrames * joints];
+        }
+
+        public int JointCount { get; }
+
+        /// <summary>The four frames of the last Poll that was true.</summary>
+        public Frame[] Frames { get; } = new Frame[BlockFrames];
+
+        /// <summary>Their joints: joint j of frame i is Joints[i * JointCount + j].</summary>
+        public Joint[] Joints { get; }
+
+        /// <summary>Appends mono samples, full scale 1, of 8000 to 192000 Hz, up to a minute ahead of time; more is dropped and counted.</summary>
+        /// <exception cref="ArgumentException">A bad rate: nothing was taken. Samples that are not finite: silence is in their place, all others were taken.</exception>
+        public void PushAudio(Speaker speaker, float[] samples, int offset, int count, int rate)
+        {
+            if (samples == null) throw new ArgumentNullException(nameof(samples));
+            if (offset < 0 || count < 0 || count > samples.Length - offset)
+                throw new ArgumentOutOfRangeException(nameof(count), count, "samples from offset on that lie in the array");
+            var pinned = GCHandle.Alloc(samples, GCHandleType.Pinned);
+            try
+            {
+                // A pinned array of no elements may have no address.
+                var first = count == 0 ? new IntPtr(4) : Marshal.UnsafeAddrOfPinnedArrayElement(samples, offset);
+                var number = (UIntPtr)count;
+                var hertz = (uint)Math.Max(rate, 0);
+                Errors.Check(speaker == Speaker.Agent ? Native.visavis_session_push_agent_audio(handle, first, number, hertz)
+                    : speaker == Speaker.User ? Native.visavis_session_push_user_audio(handle, first, number, hertz)
+                    : throw new ArgumentOutOfRangeException(nameof(speaker), speaker, "Agent or User"));
+            }
+            finally
+            {
+                pinned.Free();
+            }
+        }
+
+        public void PushAudio(Speaker speaker, float[] samples, int rate) => PushAudio(speaker, samples, 0, samples?.Length ?? 0, rate);
+
+        public void PushAgentAudio(float[] samples, int rate) => PushAudio(Speaker.Agent, samples, rate);
+
+        public void PushUserAudio(float[] samples, int rate) => PushAudio(Speaker.User, samples, rate);
+
+        /// <summary>Ends an utterance: the last milliseconds come out of the resampler. Optional.</summary>
+        public void FinishAudio(Speaker speaker) => Errors.Check(Native.visavis_session_finish_audio(handle, (int)speaker));
+
+        /// <summary>Breaks an utterance off: drops all sound that has not been used.</summary>
+        public void ClearAudio(Speaker speaker) => Errors.Check(Native.visavis_session_clear_audio(handle, (int)speaker));
+
+        /// <summary>Makes a voice present, silent until something is pushed, or absent until the next push.</summary>
+        public void SetAudioPresent(Speaker speaker, bool present) =>
+            Errors.Check(Native.visavis_session_set_audio_present(handle, (int)speaker, present ? 1 : 0));
+
+        /// <summary>Where the midpoint of the user's eyes is, session world. Late and impossible positions are ignored and counted.</summary>
+        public void PushUserHead(float x, float y, float z, double time) => Errors.Check(Native.visavis_session_push_user_head(handle, x, y, z, time));
+
+        /// <summary>0 averted to 1 sustained eye contact; null: what comes naturally.</summary>
+        public void SetGaze(float? target) =>
+            Errors.Check(target.HasValue ? Native.visavis_session_set_gaze(handle, target.Value) : Native.visavis_session_set_natural_gaze(handle));
+
+        /// <summary>Guidance weights, 0 to 20.</summary>
+        public void SetGuidance(float weight, float gaze) => Errors.Check(Native.visavis_session_set_guidance(handle, weight, gaze));
+
+        public void SetSampler(SamplerKind kind, int steps) => Errors.Check(Native.visavis_session_set_sampler(handle, (int)kind, (uint)Math.Max(steps, 0)));
+
+        /// <summary>Milliseconds that a block may take, 1 to 133.3: a governor then chooses samplers. 0: none.</summary>
+        public void SetBudget(float milliseconds) => Errors.Check(Native.visavis_session_set_budget(handle, milliseconds));
+
+        /// <summary>Tells the governor a block's time as the host measured it.</summary>
+        public void ReportBlockTime(double milliseconds) => Errors.Check(Native.visavis_session_report_block_time(handle, milliseconds));
+
+        /// <summary>Computes the block that is due at `now`, which never runs backwards. True: Frames and Joints are new; call it until it is false.</summary>
+        public bool Poll(double now)
+        {
+            Errors.Check(Native.visavis_session_poll(handle, now, Frames, (UIntPtr)Marshal.SizeOf(typeof(Frame)), Joints, (UIntPtr)Joints.Length, out var count));
+            return count > 0;
+        }
+
+        /// <summary>Session time at which the next block is due, seconds.</summary>
+        public double NextDue()
+        {
+            Errors.Check(Native.visavis_session_next_due(handle, out var time));
+            return time;
+        }
+
+        /// <summary>Starts anew with the options of now: time 0, the same bits for the same inputs.</summary>
+        public void Reset() => Errors.Check(Native.visavis_session_reset(handle));
+
+        /// <summary>Computes blocks for nothing and starts anew, so that the first block finds memory and CPU warm.</summary>
+        public void WarmUp(int blocks) => Errors.Check(Native.visavis_session_warm_up(handle, (uint)Math.Max(blocks, 0)));
+
+        public Stats Statistics()
+        {
+            var stats = new Stats { StructSize = (uint)Marshal.SizeOf(typeof(Stats)) };
+            Errors.Check(Native.visavis_session_stats(handle, ref stats));
+            return stats;
+        }
+
+        public void Dispose() => handle.Dispose();
+    }
+}

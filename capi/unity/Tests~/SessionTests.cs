@@ -1,0 +1,142 @@
+using System;
+using System.Threading;
+
+namespace Visavis.Tests
+{
+    internal static class SessionTests
+    {
+        public static ulong Motion;
+
+        static Session New(uint threads = 1)
+        {
+            var options = Engine.Options();
+            options.Threads = threads;
+            options.Gaze = 0.8f;
+            var session = Check.Tiny.NewSession(options);
+            session.WarmUp(1);
+            return session;
+        }
+
+        static ulong Drive(Session session, int blocks)
+        {
+            var voice = Check.Voice(4410);
+            ulong digest = 0xcbf29ce484222325u;
+            for (int k = 0; k < blocks; k++)
+            {
+                Check.Inputs(session, k, voice);
+                var due = session.NextDue();
+                Check.That(session.Poll(due) && session.Frames[3].Index == (ulong)(4 * k + 3), "a block is due");
+                digest = Check.Digest(digest, session.Joints);
+                Check.That(!session.Poll(due), "one block, not two");
+            }
+            return digest;
+        }
+
+        public static void Run()
+        {
+            using (Session one = New(), two = New(2))
+            {
+                Motion = Drive(one, 4);
+                Check.That(Motion == Drive(two, 4), "the same with two threads");
+                var stats = one.Statistics();
+                Check.That(stats.Blocks == 4 && stats.HeadAccepted == 4 && stats.CacheBytes > 0 && stats.BlockMsMax > 0, "statistics");
+                one.Reset();
+                Check.That(Motion == Drive(one, 4), "the same after a reset");
+                BadInput(one);
+            }
+            Disposal();
+            Outlives();
+        }
+
+        static void BadInput(Session session)
+        {
+            var before = session.Statistics();
+            Check.Throws<ArgumentException>(() => session.PushUserAudio(new[] { 0.1f, float.NaN, 0.2f, float.PositiveInfinity }, 16000));
+            Check.Throws<ArgumentException>(() => session.PushUserAudio(new float[8], 7999));
+            Check.Throws<ArgumentException>(() => session.PushUserAudio(new float[8], -1));
+            var after = session.Statistics();
+            Check.That(after.UserNonFiniteSamples == before.UserNonFiniteSamples + 2 && after.UserBadRateSamples == before.UserBadRateSamples + 16, "counted");
+            Check.Throws<ArgumentNullException>(() => session.PushAgentAudio(null, 16000));
+            Check.Throws<ArgumentOutOfRangeException>(() => session.PushAudio(Speaker.Agent, new float[8], 4, 5, 16000));
+            Check.Throws<ArgumentOutOfRangeException>(() => session.PushAudio(Speaker.Agent, new float[8], -1, 5, 16000));
+            Check.Throws<ArgumentOutOfRangeException>(() => session.PushAudio(Speaker.Agent, new float[8], 0, int.MinValue, 16000));
+            Check.Throws<ArgumentOutOfRangeException>(() => session.PushAudio((Speaker)2, new float[8], 16000));
+            session.PushAudio(Speaker.Agent, new float[0], 16000);
+            Check.Throws<ArgumentException>(() => session.FinishAudio((Speaker)9));
+            Check.Throws<ArgumentException>(() => session.SetGaze(float.NaN));
+            Check.Throws<ArgumentException>(() => session.SetGuidance(-1, 0));
+            Check.Throws<ArgumentException>(() => session.SetSampler(SamplerKind.Euler, 65));
+            Check.Throws<ArgumentException>(() => session.SetSampler((SamplerKind)7, 1));
+            Check.Throws<ArgumentException>(() => session.SetBudget(float.NaN));
+            Check.Throws<ArgumentException>(() => session.ReportBlockTime(-1));
+            Check.Throws<ArgumentException>(() => session.Poll(double.NaN));
+            Check.Throws<InvalidOperationException>(() => session.Poll(0));
+            // Ignored and counted, not refused.
+            session.PushUserHead(float.NaN, 0, 0, 1);
+            session.PushUserHead(0, 1.6f, 1, double.PositiveInfinity);
+            session.SetGaze(null);
+            session.SetGaze(1);
+            session.SetGuidance(1.3f, 2);
+            session.SetSampler(SamplerKind.Midpoint, 2);
+            session.SetBudget(100);
+            session.ReportBlockTime(5);
+            session.SetBudget(0);
+            session.ClearAudio(Speaker.User);
+            session.SetAudioPresent(Speaker.User, false);
+            Check.That(session.Poll(session.NextDue()), "a block after all that");
+            foreach (var joint in session.Joints)
+                Check.That(!float.IsNaN(joint.PositionX + joint.LocalW + joint.RotationX), "frames are finite");
+            Check.That(session.Statistics().HeadNonFinite == after.HeadNonFinite + 2, "heads that are no number are counted");
+        }
+
+        static void Disposal()
+        {
+            var session = New();
+            session.Dispose();
+            session.Dispose();
+            Check.Throws<ObjectDisposedException>(() => session.Poll(0));
+            Check.Throws<ObjectDisposedException>(() => session.PushAgentAudio(new float[4], 16000));
+            Check.Throws<ObjectDisposedException>(() => session.SetGaze(null));
+            Check.Throws<ObjectDisposedException>(() => session.Statistics());
+            Check.Throws<ObjectDisposedException>(() => session.Reset());
+
+            // While another thread polls and a third pushes: each ends in an exception of its own, none in a crash.
+            for (int i = 0; i < 20; i++)
+            {
+                var shared = New();
+                Exception polled = null, pushed = null;
+                var poll = new Thread(() => polled = Until(() => shared.Poll(shared.NextDue())));
+                var push = new Thread(() => pushed = Until(() => shared.PushUserAudio(new float[160], 16000)));
+                poll.Start();
+                push.Start();
+                Thread.Sleep(i);
+                shared.Dispose();
+                poll.Join();
+                push.Join();
+                Check.That(polled is ObjectDisposedException && pushed is ObjectDisposedException, polled + "; " + pushed);
+            }
+        }
+
+        static Exception Until(Action action)
+        {
+            try
+            {
+                while (true) action();
+            }
+            catch (Exception e)
+            {
+                return e;
+            }
+        }
+
+        static void Outlives()
+        {
+            var engine = Engine.FromPath(Check.Bundle);
+            using (var session = engine.NewSession())
+            {
+                engine.Dispose();
+                Check.That(session.Poll(1), "a session outlives its engine");
+            }
+        }
+    }
+}
