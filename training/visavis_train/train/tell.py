@@ -9,15 +9,14 @@ which the corpus' hands are still. 0.5 is chance, 1 is always told.
 """
 import argparse
 
-import numpy as np
 import torch
 from torch import nn
 
 from .. import bundle as bundles
 from ..corpus import measures
 from ..motion import rig
-from .geometry import local_positions
-from .stillness import SETTLE, Judge, jackknife, tally
+from .geometry import local_positions, to_world
+from .stillness import SETTLE, Judge, jackknife
 
 FRAMES = 60    # of a window: 2 s
 STRIDE = 15    # between the starts of windows
@@ -83,9 +82,13 @@ def told(real, made, steps=600, nets=2, seed=0):
 
 
 def resting(x, roots):
-    """Windows [N, W] bool of features [N, T, F] in which both hands are still most of the time."""
-    still = torch.tensor(np.stack([(measures.tracks(*world(a, r))["hand_v"] < measures.STILL).all(1) for a, r in zip(x, roots)]))
-    return windows(still[..., None].float())[..., 0].mean(-1) > 0.75
+    """Windows [N, W] bool of features [N, T, F] at roots [N, T, 3] in which both hands are still for most of the time."""
+    still = []
+    for frames, root in zip(x, roots.double()):
+        p = to_world(root, local_positions(frames).double()).numpy()
+        t = measures.tracks(p, rig.axis_mat("y", root[:, 2].numpy())[:, None])
+        still.append(torch.from_numpy((t["hand_v"] < measures.STILL).all(1)[1:]))
+    return windows(torch.stack(still)[..., None].float())[..., 0].mean(-1) > 0.75
 
 
 def main():
@@ -104,12 +107,12 @@ def main():
     torch.set_num_threads(args.threads)
     judge = Judge(bundles.read(args.bundle), args.corpus, args.split, args.clips, round(args.seconds * rig.FPS / 4), seed=args.seed)
     corpus, roots = judge.make("corpus")
-    real, rest = windows(seen(corpus[:, SETTLE:])), resting(corpus[:, SETTLE:], roots[:, SETTLE:])[:, :]
+    real, rest = windows(seen(corpus[:, SETTLE:])), resting(corpus[:, SETTLE:], roots[:, SETTLE:])
     print(f"{len(corpus)} clips, {real.shape[1]} windows of each kind in each\n\n| row | told apart | at rest |\n|---|---|---|")
     for name in args.rows:
         x = corpus.roll(1, 0) if name == "other" else judge.make(name)[0]
         right = told(real, windows(seen(x[:, SETTLE:].float())), args.steps, args.nets, args.seed)
-        cells = (jackknife((right * m).sum(1), m.sum(1)) for m in (torch.ones_like(right), rest[:, :right.shape[1]].float()))
+        cells = (jackknife((right * m).sum(1), m.sum(1)) for m in (torch.ones_like(right), rest.float()))
         print(f"| {name} | " + " | ".join(f"{v:.3f} ± {e:.3f}" for v, e in cells) + " |", flush=True)
 
 
