@@ -9,7 +9,8 @@ use crate::error::{Error, ErrorKind, Result};
 #[non_exhaustive]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Sampler {
-    /// Midpoint rule with four steps: eight network evaluations. The reference.
+    /// Midpoint rule with four steps, the last one taken as two of Euler's: eight network
+    /// evaluations. The reference.
     Midpoint4,
     /// Midpoint rule with two steps: four evaluations.
     Midpoint2,

@@ -88,7 +88,7 @@ class Stream:
         return frames
 
     def _evaluations(self, start, eps, cond, sample=True):
-        """The midpoint rule from `start`; the finished token's keys and values enter the rings."""
+        """The midpoint rule from `start`, its last step as two of Euler's; the finished token's keys and values enter the rings."""
         z_done, eps_done, cond_done = self.done
         n, g = self.evaluations, self.sizes["guidance"]
         position = self.token - 1  # of the finished token
@@ -105,6 +105,9 @@ class Stream:
             self.rings[i].put(at, 1, k[..., None], v[..., None, :])
             if sample:
                 guided = x1[0] + np.float32(g) * (x1[1] - x1[0])
+                if i == n - 1:  # ends at the last prediction
+                    z = guided
+                    break
                 h = 0.5 * step if i % 2 == 0 else step
                 z = start + np.float32(h / (1 - tau)) * (guided - z)
                 start = start if i % 2 == 0 else z

@@ -69,19 +69,22 @@ class Free:
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    for name in ("corpus", "cache", "vae", "flow", "out"):
+    for name in ("corpus", "vae", "out"):
         parser.add_argument(f"--{name}", required=True)
+    parser.add_argument("--flow", help="whose errors the noise is like; not needed with --noise 0")
+    parser.add_argument("--cache", help="needed with --flow or --student")
     parser.add_argument("--student", help="roll-outs are this network's; without it only noise like the flow's errors is used")
     parser.add_argument("--blocks", type=int, default=32)
     parser.add_argument("--free", type=float, default=1.0, help="factor on the losses of roll-outs")
     parser.add_argument("--smooth", type=float, default=3.0, help="factor on the corpus half's losses of velocities and accelerations")
     parser.add_argument("--noise", type=float, default=1.2, help="greatest noise, in deviations of the flow's errors")
     parser.add_argument("--white", type=float, default=0.0, help="greatest white noise besides, in deviations of the latents [0]")
+    parser.add_argument("--captured", type=float, default=3.0, help="captured takes are drawn this many times as often as their length says [3]")
     parser.add_argument("--temperature", type=float, default=0.75, help="scale of the roll-outs' noise, as sessions use it")
     common.arguments(parser, steps=500, lr=4e-4, batch=8)
     args = parser.parse_args()
     device, team, frames = common.start_process(args), Team(args.workers), 4 * args.blocks
-    train, held = (team.first(lambda: Motions(args.corpus, split, captured=3.0, device=device)) for split in ("train", "val"))
+    train, held = (team.first(lambda: Motions(args.corpus, split, captured=args.captured, device=device)) for split in ("train", "val"))
     frozen, mean, std, first = load_vae(args.vae, device)
     frozen.requires_grad_(False)
     net, weights = Vae(len(mean), **first["size"]).to(device), channel_weights(len(mean)).to(device)
@@ -89,7 +92,11 @@ def main():
     jw = jw / jw.mean()
     net.load_state_dict(first["ema"])
     net.encoder.requires_grad_(False)
-    factor, deviation = error_factor(args.flow, args.cache, device), common.load(args.flow)["latent_std"].to(device)
+    if args.noise and not (args.flow and args.cache):
+        raise SystemExit("--noise is like a flow's errors: give --flow and --cache, or --noise 0")
+    factor = error_factor(args.flow, args.cache, device) if args.noise else None
+    with torch.no_grad(), mixed(device):
+        deviation = net.encoder((train.sample(24, frames) - mean) / std)[0].float().flatten(0, 1).std(0)
     free = None
     if args.student:
         student, state = load_flow(args.student, device)
@@ -107,7 +114,7 @@ def main():
             with torch.no_grad():
                 mu, logvar = (t.float() for t in net.encoder(x))
             amount = lambda most: most * torch.rand(len(mu), 1, 1, device=device)
-            z = mu + amount(args.noise) * (torch.randn_like(mu) @ factor.T)
+            z = mu if factor is None else mu + amount(args.noise) * (torch.randn_like(mu) @ factor.T)
             if args.white:
                 z = z + amount(args.white) * deviation * torch.randn_like(mu)
             count = len(z)

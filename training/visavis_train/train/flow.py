@@ -108,20 +108,26 @@ def error_factor(path, cache, device="cpu", tau=0.8, batches=4):
 
 @torch.no_grad()
 def validate(net, held, metric):
-    """x1 error by flow time, conditional against unconditional, on the same windows and noise each time."""
+    """x1 error by flow time, conditional against unconditional, on the same windows and noise each time; `rest`: in blocks in which the corpus' hands
+    are still."""
     torch.manual_seed(1)
     out, batches = {}, []
     for _ in range(3):
-        z, cond = held.batch(16)
-        batches.append((z, cond, torch.randn_like(z)))
+        place = held.draw(16)
+        z, cond = held.batch(16, place)
+        batches.append((z, cond, torch.randn_like(z), held.stillness(*place)[:, 8:] == 1))
     for name, tau in (("0", 0.0), ("3", 0.375), ("6", 0.75)):
-        errors, free = [], []
-        for z, cond, eps in batches:
+        errors, free, rest = [], [], []
+        for z, cond, eps, still in batches:
             t = torch.full((len(z), 1), tau, device=z.device)
             rows = noisy(z, t, eps)
-            errors.append(x1_error(net(rows, t, cond), z, metric)[:, 8:].mean().item())
+            error = x1_error(net(rows, t, cond), z, metric)[:, 8:]
+            errors.append(error.mean().item())
+            rest.append(error[still])
             free.append(x1_error(net(rows, t, cond.dropped()), z, metric)[:, 8:].mean().item())
         out["val" + name], out["free" + name] = sum(errors) / len(errors), sum(free) / len(free)
+        if len(rest := torch.cat(rest)):
+            out["rest" + name] = rest.mean().item()
     return out
 
 

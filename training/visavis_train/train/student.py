@@ -24,6 +24,8 @@ from .matching import Adversary, Critic, Judge
 from .team import Team
 from .windows import Windows
 
+REST = 0.1  # a latent that changes by less from block to block [deviations] is a body at rest: of the corpus' still blocks 0.08
+
 
 @torch.no_grad()
 def teach(net, history, eps, cond, gaze, guidance, gaze_guidance, steps=4, tau_history=None, clean_from=0.0):
@@ -133,6 +135,13 @@ def calibrated(cond, pairs):
     return Condition(cond.user, cond.agent, cond.voice, torch.from_numpy(asked).float().to(cond.gaze.device), cond.flags)
 
 
+def rest_weight(wish, history, still):
+    """Weight of each block's error [B, T - 1], from the second on, 1 on average: a block that the teacher leaves where it was weighs up to 1 + `still`."""
+    moved = (wish[:, 1:] - history[:, :-1]).square().mean(-1)
+    weight = 1 + still / (1 + moved / REST ** 2)
+    return weight / weight.mean()
+
+
 def pairs(text):
     """"0:-0.1,0.5:0.45,1:1" -> ascending (target, asked) pairs."""
     return sorted(tuple(float(v) for v in pair.split(":")) for pair in text.split(","))
@@ -157,6 +166,7 @@ def main():
     parser.add_argument("--init", help="student checkpoint to start from; without it the flow")
     parser.add_argument("--init-change", nargs=2, metavar=("FLOW", "STUDENT"),
                         help="start from --flow changed as this earlier flow was on the way to its student: much nearer than the flow itself")
+    parser.add_argument("--still", type=float, default=0.0, help="blocks that the teacher leaves at rest weigh up to 1 + STILL [0]")
     parser.add_argument("--matching", type=float, default=0.0, help="weight of distribution matching (train/matching.py) [0]")
     parser.add_argument("--adversarial", type=float, default=0.0, help="weight of the adversarial loss on decoded motion [0]")
     parser.add_argument("--memory", type=int, default=800, help="sequences that updates draw on")
@@ -198,7 +208,7 @@ def main():
         history, eps, wish, cond, own, where = memory.pick(args.teach, args.batch)
         with mixed(device):
             x1 = net.forward_pair(noisy(history, tau, eps), tau, eps, torch.zeros(1, 1, device=device), cond)
-        error = x1_error(x1, wish, metric)[:, 4:].mean(1)
+        error = (x1_error(x1, wish, metric)[:, 4:] * rest_weight(wish, history, args.still)[:, 3:]).mean(1)
         loss, parts = error.mean(), {"loss": error.mean()} | ({"own": error[own.to(device)].mean()} if own.any() else {})
         if critic:
             move, told = critic.losses(history, tau, eps, x1, cond, metric)

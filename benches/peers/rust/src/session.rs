@@ -169,7 +169,7 @@ impl<N: Networks> Session<N> {
         Ok(())
     }
 
-    /// The midpoint rule from `start` for the token of row `i`.
+    /// The midpoint rule from `start`, its last step as two of Euler's, for the token of row `i`.
     fn evaluate(&mut self, mut start: Vec<f32>, i: usize, sample: bool) -> Result<Vec<f32>> {
         let (latent, width, n) = (self.p.latent, self.p.flow.width, self.p.evaluations);
         let Some((z_done, i_done)) = self.done.take() else { return Err("no token is finished".into()) };
@@ -199,7 +199,7 @@ impl<N: Networks> Session<N> {
                 let k = if slot % 2 == 0 { 0.5 * step } else { step } / (1.0 - tau);
                 for (c, z) in z.iter_mut().enumerate() {
                     let guided = x1[c] + self.p.guidance * (x1[latent + c] - x1[c]);
-                    *z = start[c] + k * (guided - *z);
+                    *z = if slot + 1 == n { guided } else { start[c] + k * (guided - *z) };
                 }
                 if slot % 2 == 1 {
                     start.copy_from_slice(&z);
