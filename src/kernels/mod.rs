@@ -103,7 +103,7 @@ mod quantize_rows;
 mod rope;
 mod rows;
 mod split_rows;
-#[cfg(test)]
+#[cfg(any(test, feature = "kernel-tests"))]
 mod testing;
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 mod wasm;
@@ -119,6 +119,8 @@ pub use linear::Epilogue;
 pub use matrix::Matrix;
 pub use rows::RowTable;
 pub(crate) use weights::signed;
+#[cfg(any(test, feature = "kernel-tests"))]
+pub use testing::Agreement;
 pub use weights::{I4_GROUP, WeightData, Weights};
 
 use crate::error::Result;
@@ -127,14 +129,14 @@ use operation::{Kernel, Operation};
 
 /// Declares [`Kernels`]: the kernel of each operation.
 macro_rules! kernels {
-    ($($field:ident: $operation:ty,)+) => {
+    ($($field:ident: $module:ident::$operation:ident,)+) => {
         /// A CPU level and the best variant of each operation for it.
         ///
         /// A value exists only for a level that this CPU has.
         #[derive(Clone, Copy)]
         pub struct Kernels {
             level: Level,
-            $($field: Kernel<$operation>,)+
+            $($field: Kernel<$module::$operation>,)+
         }
 
         impl Kernels {
@@ -144,8 +146,14 @@ macro_rules! kernels {
 
             /// Operation and level of the variant in use, for reports.
             pub fn variants(&self) -> Vec<(&'static str, &'static str)> {
-                vec![$((<$operation>::NAME, self.$field.level().name())),+]
+                vec![$((<$module::$operation>::NAME, self.$field.level().name())),+]
             }
+        }
+
+        /// Each operation, and the test that holds its variants against the scalar one.
+        #[cfg(any(test, feature = "kernel-tests"))]
+        pub fn agreements() -> Vec<(&'static str, fn() -> Agreement)> {
+            vec![$((<$module::$operation>::NAME, $module::agreement::check)),+]
         }
     };
 }
@@ -164,6 +172,15 @@ kernels! {
     gelu: gelu::Activate,
     polar: polar::Polar,
     fold: fold::Fold,
+}
+
+/// What `web/kernel-tests` runs: the operations' tests, and those of what is below them.
+#[cfg(feature = "kernel-tests")]
+pub fn other_tests() -> Vec<(&'static str, fn())> {
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+    return wasm::TESTS.to_vec();
+    #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
+    Vec::new()
 }
 
 impl Kernels {

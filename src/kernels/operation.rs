@@ -107,11 +107,15 @@ macro_rules! operation {
 
         operation! { @method $name $signature }
 
-        #[cfg(test)]
-        mod agreement {
+        #[cfg(any(test, feature = "kernel-tests"))]
+        pub(super) mod agreement {
+            pub(in crate::kernels) fn check() -> crate::kernels::testing::Agreement {
+                crate::kernels::testing::agree::<super::$name>(super::tests::cases)
+            }
+
             #[test]
             fn variants_have_the_bits_of_the_reference() {
-                crate::kernels::testing::agree::<super::$name>(super::tests::cases);
+                check();
             }
         }
     };
@@ -182,7 +186,7 @@ macro_rules! variant {
 }
 pub(crate) use {operation, variant};
 
-#[cfg(test)]
+#[cfg(any(test, feature = "kernel-tests"))]
 impl<O: Operation> Kernel<O> {
     /// The scalar variant.
     pub(crate) fn reference() -> Self {

@@ -203,7 +203,7 @@ impl FloatGeometry {
     }
 
     /// Element that holds weight (`row`, `col`).
-    #[cfg(test)]
+    #[cfg(any(test, feature = "kernel-tests"))]
     pub(crate) fn at(&self, row: usize, col: usize) -> usize {
         let (s, k) = (col / self.seg, col % self.seg);
         (row / NR) * self.panel + s * self.seg_stride + k * NR + row % NR

@@ -15,7 +15,7 @@ mod cache;
 mod scalar;
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64", target_feature = "simd128"))]
 mod simd;
-#[cfg(test)]
+#[cfg(any(test, feature = "kernel-tests"))]
 mod tests;
 
 pub(super) use batch::{MAX_SPANS, batches};

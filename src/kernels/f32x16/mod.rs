@@ -42,9 +42,9 @@ pub(super) trait F32x16: Copy {
     /// The sum of the lanes in the order of [`math::fold`].
     fn fold(self, v: Self::V) -> f32;
 
-    /// e^(v - top) in place of each v of whole registers.
+    /// e^(v - top) in place of each v.
     #[inline(always)]
-    fn exp(self, values: &mut [f32], top: f32) {
+    fn exp(self, values: &mut [f32; 64], top: f32) {
         values.iter_mut().for_each(|v| *v = math::exp(*v - top));
     }
 

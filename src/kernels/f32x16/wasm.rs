@@ -3,13 +3,13 @@ use std::arch::wasm32::*;
 use half::f16;
 
 use super::F32x16;
-use crate::kernels::wasm::{Madd, exp, load, load4, store4};
+use crate::kernels::wasm::{Madd, exp, load, store4};
 
 impl<L: Madd> F32x16 for L {
     type V = [L::Wide; 4];
 
-    const ROOM: usize = L::ROOM;
-    const ATTEND_ROOM: usize = L::ROOM;
+    const ROOM: usize = L::ROWS / 2;
+    const ATTEND_ROOM: usize = L::ROWS / 2;
 
     #[inline(always)]
     fn zero(self) -> [L::Wide; 4] {
@@ -53,7 +53,7 @@ impl<L: Madd> F32x16 for L {
 
     #[inline(always)]
     fn fma(self, sum: [L::Wide; 4], a: [L::Wide; 4], b: [L::Wide; 4]) -> [L::Wide; 4] {
-        self.madd16(a, b, sum)
+        self.madd(a, b, sum)
     }
 
     #[inline(always)]
@@ -65,10 +65,17 @@ impl<L: Madd> F32x16 for L {
     }
 
     #[inline(always)]
-    fn exp(self, values: &mut [f32], top: f32) {
+    fn exp(self, values: &mut [f32; 64], top: f32) {
         let top = f32x4_splat(top);
-        for at in (0..values.len()).step_by(4) {
-            store4(values, at, exp(self, f32x4_sub(load4(values, at), top)));
+        for chunk in values.as_chunks_mut::<16>().0 {
+            let mut v = [top; 4];
+            for i in 0..4 {
+                v[i] = f32x4_sub(load(chunk, 4 * i), top);
+            }
+            let v = exp(self, v);
+            for i in 0..4 {
+                store4(chunk, 4 * i, v[i]);
+            }
         }
     }
 

@@ -4,7 +4,7 @@
 use super::operation::operation;
 
 mod scalar;
-#[cfg(test)]
+#[cfg(any(test, feature = "kernel-tests"))]
 mod tests;
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 mod wasm;

@@ -1,19 +1,13 @@
-//! Four values at a time; what is left over goes through the reference.
+//! Whole vectors; what is left over goes through the reference.
 
 use super::{Activation, scalar};
-use crate::kernels::wasm::{Madd, gelu, load4, silu, store4};
+use crate::kernels::wasm::{Madd, each, gelu, silu};
 
 #[inline(always)]
 pub(super) fn run<L: Madd>(level: L, activation: Activation, x: &mut [f32]) {
-    let whole = x.len() / 4 * 4;
-    let (whole, rest) = x.split_at_mut(whole);
-    for at in (0..whole.len()).step_by(4) {
-        let v = load4(whole, at);
-        let v = match activation {
-            Activation::Gelu => gelu(level, v),
-            Activation::Silu => silu(level, v),
-        };
-        store4(whole, at, v);
-    }
-    scalar::run(activation, rest);
+    let done = match activation {
+        Activation::Gelu => each(x, |v, _| gelu(level, v), |v, _| gelu(level, v)),
+        Activation::Silu => each(x, |v, _| silu(level, v), |v, _| silu(level, v)),
+    };
+    scalar::run(activation, &mut x[done..]);
 }

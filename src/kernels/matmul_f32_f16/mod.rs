@@ -10,7 +10,7 @@ use super::matmul_f32_f32::simd;
 use super::operation::operation;
 use super::packed::Tile;
 
-#[cfg(test)]
+#[cfg(any(test, feature = "kernel-tests"))]
 mod tests;
 
 operation! {

@@ -28,7 +28,7 @@ mod i8mm;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 mod scalar;
-#[cfg(test)]
+#[cfg(any(test, feature = "kernel-tests"))]
 mod tests;
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 mod wasm;
@@ -85,7 +85,7 @@ impl Geometry {
     }
 
     /// Byte that holds weight (`row`, `col`), and whether in its high nibble.
-    #[cfg(test)]
+    #[cfg(any(test, feature = "kernel-tests"))]
     pub(crate) fn at(&self, row: usize, col: usize) -> (usize, bool) {
         let byte = (row / NR) * self.panel + Self::nibbles(col / GROUP) + col % GROUP / 8 * 64 + row % NR * 4 + col % 4;
         (byte, col % 8 >= 4)

@@ -1,5 +1,6 @@
-//! Nibbles lie within the seven bits that every engine's `relaxed_dot` multiplies exactly; without
-//! it, the eight products of a lane of 16 bits, each pair at most 2 * 15 * 127, are summed in pairs.
+//! The eight products of a lane of 16 bits, each pair at most 2 * 15 * 127, add up to at most
+//! 30,480, so a group is summed in 16 bits and widened once. Nibbles lie within the seven bits that
+//! every engine's relaxed dot product multiplies exactly.
 
 use std::arch::wasm32::*;
 
@@ -9,33 +10,48 @@ use crate::kernels::level::token;
 use crate::kernels::packed::for_blocks;
 use crate::kernels::wasm::Madd;
 
-/// A way to add products of nibbles and bytes, on a level's token.
-pub(super) trait Nibbles: Madd {
-    /// Rows of one panel at a time.
-    const ROWS: usize;
+/// Rows of one panel whose accumulators fit the registers, beside their activations.
+const ROOM: usize = 2;
 
-    /// Adds to each lane of `sum` the four products of its bytes.
-    fn dot(self, sum: v128, nibbles: v128, x: v128) -> v128;
+/// A way to multiply nibbles and bytes, on a level's token.
+pub(super) trait Nibbles: Madd {
+    /// Four bytes of activations, which each lane has.
+    type X: Copy;
+
+    fn x(self, x: v128) -> Self::X;
+
+    /// Adds to each of the eight lanes of `sum` two products.
+    fn dot(self, sum: v128, nibbles: v128, x: Self::X) -> v128;
 }
 
 impl Nibbles for token::Simd128 {
-    const ROWS: usize = 2;
+    /// Even and odd bytes, widened.
+    type X = [v128; 2];
 
     #[inline(always)]
-    fn dot(self, sum: v128, nibbles: v128, x: v128) -> v128 {
+    fn x(self, x: v128) -> [v128; 2] {
+        [i16x8_shr(i16x8_shl(x, 8), 8), i16x8_shr(x, 8)]
+    }
+
+    #[inline(always)]
+    fn dot(self, sum: v128, nibbles: v128, x: [v128; 2]) -> v128 {
         let (even, odd) = (v128_and(nibbles, i16x8_splat(15)), u16x8_shr(nibbles, 8));
-        let (x_even, x_odd) = (i16x8_shr(i16x8_shl(x, 8), 8), i16x8_shr(x, 8));
-        i32x4_add(sum, i32x4_add(i32x4_dot_i16x8(even, x_even), i32x4_dot_i16x8(odd, x_odd)))
+        i16x8_add(sum, i16x8_add(i16x8_mul(even, x[0]), i16x8_mul(odd, x[1])))
     }
 }
 
 #[cfg(target_feature = "relaxed-simd")]
 impl Nibbles for token::Relaxed {
-    const ROWS: usize = 3;
+    type X = v128;
+
+    #[inline(always)]
+    fn x(self, x: v128) -> v128 {
+        x
+    }
 
     #[inline(always)]
     fn dot(self, sum: v128, nibbles: v128, x: v128) -> v128 {
-        i32x4_relaxed_dot_i8x16_i7x16_add(x, nibbles, sum)
+        i16x8_add(sum, i16x8_relaxed_dot_i8x16_i7x16(x, nibbles))
     }
 }
 
@@ -43,7 +59,7 @@ impl Nibbles for token::Relaxed {
 pub(super) fn run<L: Nibbles>(level: L, job: &Job<'_>, tile: &mut Tile<f32>) {
     job.check();
     for_blocks!(
-        0..job.x.rows, job.panels.count, L::ROWS, R in [1 2 3 4], P in [1],
+        0..job.x.rows, job.panels.count, ROOM, R in [1 2], P in [1],
         |r, p| block::<L, R>(level, job, (r, p), tile)
     );
 }
@@ -60,16 +76,14 @@ fn block<L: Nibbles, const R: usize>(level: L, job: &Job<'_>, from: (usize, usiz
     let low = i8x16_splat(15);
     let mut total = [level.zero(); R];
     for g in 0..groups {
-        let mut acc = [[i32x4_splat(0); 4]; R];
-        for r in 0..R {
-            acc[r] = [i32x4_splat(-8 * sums[r * groups + g]); 4];
-        }
+        let mut acc = [[i16x8_splat(0); 4]; R];
         for j in 0..GROUP / 8 {
-            let mut x = [[low; 2]; R];
+            let mut x = [[level.x(low); 2]; R];
             for r in 0..R {
                 for h in 0..2 {
                     // SAFETY: 4 bytes of group g of row r, within R rows, `stride` apart.
-                    x[r][h] = unsafe { v128_load32_splat(q.add(r * stride + g * GROUP + 8 * j + 4 * h).cast()) };
+                    let four = unsafe { v128_load32_splat(q.add(r * stride + g * GROUP + 8 * j + 4 * h).cast()) };
+                    x[r][h] = level.x(four);
                 }
             }
             for i in 0..4 {
@@ -83,11 +97,13 @@ fn block<L: Nibbles, const R: usize>(level: L, job: &Job<'_>, from: (usize, usiz
         }
         let scale = level.widen(&scales[Geometry::scales(g) / 16]);
         for r in 0..R {
-            let mut sums = level.zero();
+            let offset = i32x4_splat(-8 * sums[r * groups + g]);
+            let mut group = level.zero();
             for i in 0..4 {
-                sums[i] = level.wide(f32x4_convert_i32x4(acc[r][i]));
+                let sum = i32x4_add(offset, i32x4_extadd_pairwise_i16x8(acc[r][i]));
+                group[i] = level.wide(f32x4_convert_i32x4(sum));
             }
-            total[r] = level.madd16(scale, sums, total[r]);
+            total[r] = level.madd(scale, group, total[r]);
         }
     }
     for r in 0..R {

@@ -27,7 +27,7 @@ pub(super) fn run<L: Madd>(level: L, x: &[f32], shift: &[f32], scale: &[f32], y:
         for i in 0..4 {
             d[i] = level.wide(f32x4_sub(load(chunk, 4 * i), mean));
         }
-        square = level.madd16(d, d, square);
+        square = level.madd(d, d, square);
     }
     let rstd = f32x4_splat(1.0 / (level.fold(square) / n as f32 + EPSILON).sqrt());
     for at in (0..n).step_by(4) {

@@ -10,7 +10,7 @@ use super::operation::operation;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 mod scalar;
-#[cfg(test)]
+#[cfg(any(test, feature = "kernel-tests"))]
 mod tests;
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 pub(super) mod wasm;

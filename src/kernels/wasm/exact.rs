@@ -16,7 +16,7 @@ const TIE: i32 = i32::MIN;
 impl Madd for Simd128 {
     type Wide = [v128; 2];
 
-    const ROOM: usize = 1;
+    const ROWS: usize = 2;
 
     #[inline(always)]
     fn wide(self, v: v128) -> [v128; 2] {
@@ -29,31 +29,23 @@ impl Madd for Simd128 {
     }
 
     #[inline(always)]
-    fn madd(self, a: [v128; 2], b: [v128; 2], c: [v128; 2]) -> [v128; 2] {
-        let sum = sums(a, b, c);
-        if v128_any_true(i32x4_eq(low_bits(sum), i32x4_splat(TIE))) {
-            return round(settled(a, b, c));
-        }
-        round(sum)
-    }
-
-    #[inline(always)]
-    fn madd16(self, a: [[v128; 2]; 4], b: [[v128; 2]; 4], c: [[v128; 2]; 4]) -> [[v128; 2]; 4] {
-        let mut sum = [c[0]; 4];
-        for i in 0..4 {
+    fn madd<const N: usize>(self, a: [[v128; 2]; N], b: [[v128; 2]; N], c: [[v128; 2]; N]) -> [[v128; 2]; N] {
+        let mut sum = c;
+        let mut least = i32x4_splat(0);
+        for i in 0..N {
             sum[i] = sums(a[i], b[i], c[i]);
+            // A tie is the least of all words.
+            least = i32x4_min(least, low_bits(sum[i]));
         }
-        // A tie is the least of all words.
-        let least = i32x4_min(
-            i32x4_min(low_bits(sum[0]), low_bits(sum[1])),
-            i32x4_min(low_bits(sum[2]), low_bits(sum[3])),
-        );
         if v128_any_true(i32x4_eq(least, i32x4_splat(TIE))) {
-            for i in 0..4 {
+            for i in 0..N {
                 sum[i] = settled(a[i], b[i], c[i]);
             }
         }
-        [round(sum[0]), round(sum[1]), round(sum[2]), round(sum[3])]
+        for i in 0..N {
+            sum[i] = round(sum[i]);
+        }
+        sum
     }
 
     #[inline(always)]
@@ -109,13 +101,13 @@ fn settle(p: f64, c: f64) -> f64 {
     f64::from_bits(if (sum < 0.0) == (lacks < 0.0) { bits + 1 } else { bits - 1 })
 }
 
-#[cfg(test)]
-mod tests {
-    use super::super::super::testing::Random;
+#[cfg(any(test, feature = "kernel-tests"))]
+pub(super) mod tests {
+    use crate::kernels::testing::Random;
     use super::*;
 
-    #[test]
-    fn multiply_adds_round_once() {
+    #[cfg_attr(test, test)]
+    pub(in crate::kernels) fn multiply_adds_round_once() {
         let mut random = Random(3);
         // Products of 24 bits and terms far below or above them, so that sums lie near ties.
         let float = |random: &mut Random| {

@@ -14,17 +14,17 @@ mod math;
 #[cfg(target_feature = "relaxed-simd")]
 mod relaxed;
 
-pub(super) use math::{exp, gelu, silu};
+pub(super) use math::{each, exp, gelu, silu};
 #[cfg(target_feature = "relaxed-simd")]
-pub(super) use relaxed::{Dot, dot, is_fused};
+pub(super) use relaxed::is_fused;
 
 /// Multiply-adds of floats, on a level's token.
 pub(super) trait Madd: Copy {
     /// Four floats, as its multiply-adds take and give them.
     type Wide: Copy;
 
-    /// Accumulators of sixteen floats that fit the register file beside the operands of a product.
-    const ROOM: usize;
+    /// Rows of eight accumulators that fit the register file beside the operands of a product.
+    const ROWS: usize;
 
     /// Exact.
     fn wide(self, v: v128) -> Self::Wide;
@@ -32,22 +32,22 @@ pub(super) trait Madd: Copy {
     /// Exact.
     fn narrow(self, v: Self::Wide) -> v128;
 
-    /// a b + c, rounded once.
-    fn madd(self, a: Self::Wide, b: Self::Wide, c: Self::Wide) -> Self::Wide;
-
-    /// The same four times.
-    fn madd16(self, a: [Self::Wide; 4], b: [Self::Wide; 4], c: [Self::Wide; 4]) -> [Self::Wide; 4];
+    /// a b + c, rounded once, of N vectors.
+    fn madd<const N: usize>(self, a: [Self::Wide; N], b: [Self::Wide; N], c: [Self::Wide; N]) -> [Self::Wide; N];
 
     /// a - b, which is a float.
     fn difference(self, a: Self::Wide, b: Self::Wide) -> Self::Wide;
 
+    #[inline(always)]
     fn splat(self, v: f32) -> Self::Wide {
         self.wide(f32x4_splat(v))
     }
 
     /// a b + c of narrow operands.
+    #[inline(always)]
     fn fma(self, a: v128, b: v128, c: v128) -> v128 {
-        self.narrow(self.madd(self.wide(a), self.wide(b), self.wide(c)))
+        let [sum] = self.madd([self.wide(a)], [self.wide(b)], [self.wide(c)]);
+        self.narrow(sum)
     }
 }
 
@@ -75,12 +75,9 @@ pub(super) fn store4(to: &mut [f32], at: usize, v: v128) {
     unsafe { v128_store(four.as_mut_ptr().cast(), v) };
 }
 
-/// What is left of a row behind its last whole vector goes through `four` with zeros behind it.
-#[inline(always)]
-pub(super) fn padded<const N: usize>(rest: [&[f32]; N]) -> [[f32; 4]; N] {
-    let mut out = [[0.0; 4]; N];
-    for (out, rest) in out.iter_mut().zip(rest) {
-        out[..rest.len()].copy_from_slice(rest);
-    }
-    out
-}
+/// Tests of what is below the operations.
+#[cfg(feature = "kernel-tests")]
+pub(super) const TESTS: [(&str, fn()); 2] = [
+    ("multiply_adds_round_once", exact::tests::multiply_adds_round_once),
+    ("every_way_of_adding_bytes_gives_the_same_sums", super::matmul_i8dx_i8cx::wasm::tests::every_way_agrees),
+];
