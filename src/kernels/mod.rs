@@ -9,6 +9,7 @@
 //! | `scalar.rs` | the reference: plain Rust that defines every bit of the result |
 //! | `simd.rs` | the operation on any level that has [`f32x16`] |
 //! | `avx2.rs`, `i8mm.rs`, ... | one hand-written variant each, named after its level |
+//! | `wasm.rs` | one for both levels of WebAssembly, for any `wasm::Madd` |
 //! | `tests.rs` | `cases` for all variants: random shapes, tails, extremes; what the reference must do |
 //!
 //! | operation | computes |
@@ -50,6 +51,13 @@
 //! [`F32x16`](f32x16::F32x16), named then in the `simd` lines of the float products and of
 //! attention; with products of int8, a variant of both integer products, and the
 //! [`Layout`](matmul_i8dx_i8cx::Layout) of weights that it reads.
+//!
+//! **WebAssembly.** Features are a whole module's (`-Ctarget-feature`): a module is built for
+//! [`Level::Simd128`] or for [`Level::Relaxed`], which has the variants of both, and the host takes
+//! the one that its engine validates. What relaxed instructions compute is the engine's choice, so
+//! it is tried before it is relied on: a fused multiply-add when the level is looked for, else the
+//! exact one is used, and products of bytes at the first of them. `web/kernels_check.sh` runs the
+//! tests there.
 //!
 //! **Same bits everywhere.** Every variant of every operation gives the bits of the scalar
 //! reference: integer sums are exact, and each float operation fixes its order of summation (16
@@ -185,7 +193,7 @@ pub fn other_tests() -> Vec<(&'static str, fn())> {
 
 impl Kernels {
     /// The best level of this CPU, or the one that the environment variable `VISAVIS_CPU` names
-    /// (`scalar`, `neon`, `dotprod`, `i8mm`, `avx2`, `avxvnni`, `avx512`).
+    /// (`scalar`, `neon`, `dotprod`, `i8mm`, `avx2`, `avxvnni`, `avx512`, `simd128`, `relaxed`).
     ///
     /// # Errors
     /// [`CpuLevel`](crate::error::ErrorKind::CpuLevel) when it names a level that does not exist or
