@@ -19,12 +19,14 @@
 mod audio;
 mod bounded;
 mod bundle;
+mod clock;
 mod config;
 mod engine;
 mod error;
 mod flow;
 mod frame;
 #[allow(unsafe_code, reason = "SIMD loads, stores and inline assembly")]
+#[cfg_attr(feature = "kernel-tests", allow(unused, reason = "tests without their harness"))]
 mod kernels;
 mod nn;
 mod normaliser;

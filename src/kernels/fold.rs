@@ -93,7 +93,7 @@ fn fold(kernel: Kernel<Fold>, a: &[f32], stride: usize, b: &[f32], inner: usize,
     out
 }
 
-#[cfg(test)]
+#[cfg(any(test, feature = "kernel-tests"))]
 mod tests {
     use super::*;
     use crate::kernels::testing::{Random, Results, bits};

@@ -58,6 +58,12 @@ impl Matrix {
                 let geo = FloatGeometry::new(cols, 4);
                 Body::F32(Packed { buffer: pack_floats(w, rows, cols, &geo, panels), geo, kernel: kernels.f32 })
             }
+            // No instruction widens half floats there, so it is done once.
+            WeightData::F16(w) if cfg!(target_family = "wasm") => {
+                let geo = FloatGeometry::new(cols, 4);
+                let w = w.iter().map(|w| w.to_f32()).collect::<Vec<_>>();
+                Body::F32(Packed { buffer: pack_floats(&w, rows, cols, &geo, panels), geo, kernel: kernels.f32 })
+            }
             WeightData::F16(w) => {
                 let geo = FloatGeometry::new(cols, 2);
                 Body::F16(Packed { buffer: pack_floats(w, rows, cols, &geo, panels), geo, kernel: kernels.f16 })
@@ -136,7 +142,7 @@ impl Matrix {
         Some([0, last].map(|at| PrefetchTarget::new(weights, at, panel)))
     }
 
-    /// Scheme of the weights.
+    /// Scheme of the packed weights: where floats have to be widened by hand, f16 is packed as f32.
     pub fn scheme(&self) -> Scheme {
         match &self.body {
             Body::F32(..) => Scheme::F32,

@@ -9,6 +9,7 @@
 //! | `scalar.rs` | the reference: plain Rust that defines every bit of the result |
 //! | `simd.rs` | the operation on any level that has [`f32x16`] |
 //! | `avx2.rs`, `i8mm.rs`, ... | one hand-written variant each, named after its level |
+//! | `wasm.rs` | one for both levels of WebAssembly, for any `wasm::Madd` |
 //! | `tests.rs` | `cases` for all variants: random shapes, tails, extremes; what the reference must do |
 //!
 //! | operation | computes |
@@ -50,6 +51,13 @@
 //! [`F32x16`](f32x16::F32x16), named then in the `simd` lines of the float products and of
 //! attention; with products of int8, a variant of both integer products, and the
 //! [`Layout`](matmul_i8dx_i8cx::Layout) of weights that it reads.
+//!
+//! **WebAssembly.** Features are a whole module's (`-Ctarget-feature`): a module is built for
+//! [`Level::Simd128`] or for [`Level::Relaxed`], which has the variants of both, and the host takes
+//! the one that its engine validates. What relaxed instructions compute is the engine's choice, so
+//! it is tried before it is relied on: a fused multiply-add when the level is looked for, else the
+//! exact one is used, and products of bytes at the first of them. `web/kernels_check.sh` runs the
+//! tests there.
 //!
 //! **Same bits everywhere.** Every variant of every operation gives the bits of the scalar
 //! reference: integer sums are exact, and each float operation fixes its order of summation (16
@@ -103,8 +111,10 @@ mod quantize_rows;
 mod rope;
 mod rows;
 mod split_rows;
-#[cfg(test)]
+#[cfg(any(test, feature = "kernel-tests"))]
 mod testing;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod wasm;
 mod weights;
 mod workers;
 
@@ -117,6 +127,8 @@ pub use linear::Epilogue;
 pub use matrix::Matrix;
 pub use rows::RowTable;
 pub(crate) use weights::signed;
+#[cfg(any(test, feature = "kernel-tests"))]
+pub use testing::Agreement;
 pub use weights::{I4_GROUP, WeightData, Weights};
 
 use crate::error::Result;
@@ -125,14 +137,14 @@ use operation::{Kernel, Operation};
 
 /// Declares [`Kernels`]: the kernel of each operation.
 macro_rules! kernels {
-    ($($field:ident: $operation:ty,)+) => {
+    ($($field:ident: $module:ident::$operation:ident,)+) => {
         /// A CPU level and the best variant of each operation for it.
         ///
         /// A value exists only for a level that this CPU has.
         #[derive(Clone, Copy)]
         pub struct Kernels {
             level: Level,
-            $($field: Kernel<$operation>,)+
+            $($field: Kernel<$module::$operation>,)+
         }
 
         impl Kernels {
@@ -142,8 +154,14 @@ macro_rules! kernels {
 
             /// Operation and level of the variant in use, for reports.
             pub fn variants(&self) -> Vec<(&'static str, &'static str)> {
-                vec![$((<$operation>::NAME, self.$field.level().name())),+]
+                vec![$((<$module::$operation>::NAME, self.$field.level().name())),+]
             }
+        }
+
+        /// Each operation, and the test that holds its variants against the scalar one.
+        #[cfg(any(test, feature = "kernel-tests"))]
+        pub fn agreements() -> Vec<(&'static str, fn() -> Agreement)> {
+            vec![$((<$module::$operation>::NAME, $module::agreement::check)),+]
         }
     };
 }
@@ -164,9 +182,18 @@ kernels! {
     fold: fold::Fold,
 }
 
+/// What `web/kernel-tests` runs: the operations' tests, and those of what is below them.
+#[cfg(feature = "kernel-tests")]
+pub fn other_tests() -> Vec<(&'static str, fn())> {
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+    return wasm::TESTS.to_vec();
+    #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
+    Vec::new()
+}
+
 impl Kernels {
     /// The best level of this CPU, or the one that the environment variable `VISAVIS_CPU` names
-    /// (`scalar`, `neon`, `dotprod`, `i8mm`, `avx2`, `avxvnni`, `avx512`).
+    /// (`scalar`, `neon`, `dotprod`, `i8mm`, `avx2`, `avxvnni`, `avx512`, `simd128`, `relaxed`).
     ///
     /// # Errors
     /// [`CpuLevel`](crate::error::ErrorKind::CpuLevel) when it names a level that does not exist or

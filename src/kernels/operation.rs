@@ -107,11 +107,15 @@ macro_rules! operation {
 
         operation! { @method $name $signature }
 
-        #[cfg(test)]
-        mod agreement {
+        #[cfg(any(test, feature = "kernel-tests"))]
+        pub(super) mod agreement {
+            pub(in crate::kernels) fn check() -> crate::kernels::testing::Agreement {
+                crate::kernels::testing::agree::<super::$name>(super::tests::cases)
+            }
+
             #[test]
             fn variants_have_the_bits_of_the_reference() {
-                crate::kernels::testing::agree::<super::$name>(super::tests::cases);
+                check();
             }
         }
     };
@@ -149,6 +153,21 @@ macro_rules! variant {
         // SAFETY: a safe function without features.
         Some(unsafe { $crate::kernels::operation::Variant::new($crate::kernels::Level::$level, run, $about) })
     }};
+    ("wasm32" [$($feature:tt),*]
+     ($level:ident (fn($($arg:ident: $type:ty),*) $(-> $result:ty)?) ($($token:tt)*) $run:path, $about:expr)) => {{
+        #[cfg(all(target_arch = "wasm32", $(target_feature = $feature),*))]
+        {
+            // The whole module is compiled for the level.
+            fn entry($($arg: $type),*) $(-> $result)? {
+                $run($($token)* $($arg),*)
+            }
+            let run: unsafe fn($($type),*) $(-> $result)? = entry;
+            // SAFETY: a safe function, in a module that would not run without the features.
+            Some(unsafe { $crate::kernels::operation::Variant::new($crate::kernels::Level::$level, run, $about) })
+        }
+        #[cfg(not(all(target_arch = "wasm32", $(target_feature = $feature),*)))]
+        None
+    }};
     ($arch:tt [$($feature:tt),*]
      ($level:ident (fn($($arg:ident: $type:ty),*) $(-> $result:ty)?) ($($token:tt)*) $run:path, $about:expr)) => {{
         #[cfg(target_arch = $arch)]
@@ -167,7 +186,7 @@ macro_rules! variant {
 }
 pub(crate) use {operation, variant};
 
-#[cfg(test)]
+#[cfg(any(test, feature = "kernel-tests"))]
 impl<O: Operation> Kernel<O> {
     /// The scalar variant.
     pub(crate) fn reference() -> Self {

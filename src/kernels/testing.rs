@@ -66,16 +66,39 @@ impl Results {
     }
 }
 
+/// What was found to agree.
+#[derive(Debug)]
+pub struct Agreement {
+    /// The levels that have a variant here.
+    pub levels: Vec<Level>,
+    /// How many cases each of them was run on.
+    pub cases: usize,
+    /// Of the bits of all results, the same on every machine.
+    pub digest: u64,
+}
+
 /// That every variant that this CPU can run has the bits of the scalar one in `cases`, which runs
 /// the kernel that it is given and records what comes out, the same cases for each.
-pub(crate) fn agree<O: Operation>(cases: impl Fn(Kernel<O>, &mut Results)) {
+pub(crate) fn agree<O: Operation>(cases: impl Fn(Kernel<O>, &mut Results)) -> Agreement {
     let mut results = Results { level: Level::Scalar, expected: Vec::new(), cases: 0 };
     cases(Kernel::reference(), &mut results);
     assert!(results.cases > 0, "there are cases");
+    let mut levels = vec![Level::Scalar];
     for kernel in Kernel::<O>::all().filter(|k| k.level() != Level::Scalar) {
         (results.level, results.cases) = (kernel.level(), 0);
         cases(kernel, &mut results);
         assert_eq!(results.cases, results.expected.len(), "{}: the same cases for each variant", kernel.level());
+        levels.push(kernel.level());
+    }
+    let mut hasher = DefaultHasher::new();
+    results.expected.iter().for_each(|case| case.hash(&mut hasher));
+    Agreement { levels, cases: results.expected.len(), digest: hasher.finish() }
+}
+
+impl std::fmt::Display for Agreement {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let levels = self.levels.iter().map(|l| l.name()).collect::<Vec<_>>().join(",");
+        write!(f, "{:016x} {} {levels}", self.digest, self.cases)
     }
 }
 
@@ -84,8 +107,18 @@ pub(crate) fn levels() -> impl Iterator<Item = Kernels> {
     Kernels::available().into_iter().map(|l| Kernels::with_level(l).expect("listed as available"))
 }
 
+/// The bits of floats, one NaN like any other: which one an operation gives is the CPU's choice.
 pub(crate) fn bits(v: &[f32]) -> Vec<u32> {
-    v.iter().map(|v| v.to_bits()).collect()
+    v.iter().map(|v| if v.is_nan() { f32::NAN.to_bits() } else { v.to_bits() }).collect()
+}
+
+/// `web/kernels_check.sh` holds these against WebAssembly's.
+#[test]
+#[ignore = "prints the digest of each operation's results"]
+fn digests() {
+    for (name, check) in super::agreements() {
+        println!("{name} {}", check());
+    }
 }
 
 /// Calls `check` with rows of all tails and of magnitudes up to a size, which it is told,

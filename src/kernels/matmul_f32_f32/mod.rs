@@ -7,10 +7,12 @@ use super::operation::operation;
 use super::packed::{FloatGeometry, Panels, Tile};
 
 pub(crate) mod scalar;
-#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64", target_feature = "simd128"))]
 pub(crate) mod simd;
-#[cfg(test)]
+#[cfg(any(test, feature = "kernel-tests"))]
 pub(crate) mod tests;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod wasm;
 
 /// Operands of a float product; `W` is the weights' type.
 pub(crate) struct Job<'a, W> {
@@ -37,4 +39,5 @@ operation! {
     MatmulF32F32 = "matmul_f32_f32", (fn(job: &Job<'_, f32>, tile: &mut Tile<f32>));
     (Scalar => scalar::run)
     (Neon, Avx2, Avx512 => simd::run, token)
+    (Simd128, Relaxed => wasm::run, token)
 }

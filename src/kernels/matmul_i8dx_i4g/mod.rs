@@ -28,8 +28,10 @@ mod i8mm;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 mod scalar;
-#[cfg(test)]
+#[cfg(any(test, feature = "kernel-tests"))]
 mod tests;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod wasm;
 
 /// Where an int4 weight and its scale lie.
 #[derive(Debug, Clone, Copy)]
@@ -83,7 +85,7 @@ impl Geometry {
     }
 
     /// Byte that holds weight (`row`, `col`), and whether in its high nibble.
-    #[cfg(test)]
+    #[cfg(any(test, feature = "kernel-tests"))]
     pub(crate) fn at(&self, row: usize, col: usize) -> (usize, bool) {
         let byte = (row / NR) * self.panel + Self::nibbles(col / GROUP) + col % GROUP / 8 * 64 + row % NR * 4 + col % 4;
         (byte, col % 8 >= 4)
@@ -129,4 +131,5 @@ operation! {
     (Avx2 => avx2::run)
     (AvxVnni => avxvnni::run)
     (Avx512 => avx512::run)
+    (Simd128, Relaxed => wasm::run, token)
 }

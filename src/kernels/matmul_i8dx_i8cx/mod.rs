@@ -25,8 +25,10 @@ pub(crate) mod i8mm;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 mod scalar;
-#[cfg(test)]
+#[cfg(any(test, feature = "kernel-tests"))]
 mod tests;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+pub(super) mod wasm;
 
 /// Order of the bytes of 16 outputs x 4 or 8 columns in packed weights, as a variant wants them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,7 +71,7 @@ impl Geometry {
     }
 
     /// Byte that holds weight (`row`, `col`).
-    #[cfg(test)]
+    #[cfg(any(test, feature = "kernel-tests"))]
     pub(crate) fn at(&self, row: usize, col: usize) -> usize {
         let (panel, lane) = (row / NR, row % NR);
         let within = match self.layout {
@@ -144,4 +146,6 @@ operation! {
     (Avx2 => avx2::run, Layout::QuadsPaired)
     (AvxVnni => avxvnni::run, Layout::QuadsOffset)
     (Avx512 => avx512::run, Layout::QuadsOffset)
+    (Simd128 => wasm::exact, Layout::Quads)
+    (Relaxed => wasm::relaxed, Layout::Quads)
 }
