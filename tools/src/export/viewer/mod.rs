@@ -1,6 +1,7 @@
 //! The viewer: one self-contained HTML file that plays a recording.
 //!
-//! The page (`page/`: markup, style, scripts by job) is compiled in; [`render`] joins it with the
+//! The page (`page/`: markup, style, scripts by job) and the stage that it shares with the live page
+//! (`stage/`: body, face, shaders, renderers) are compiled in; [`render`] joins it with the
 //! recording's data. The file needs no network and no library, opens from disk, and forbids itself
 //! any connection (Content-Security-Policy). Without WebGL 2 it draws on a 2-D canvas. Options
 //! after `#` in its address, joined by `&`, make views repeatable: `t=12.3` (seconds), `play`,
@@ -30,17 +31,20 @@ pub struct Meta {
 const PAGE: &str = include_str!("page/viewer.html");
 const STYLE: &str = include_str!("page/viewer.css");
 /// Scripts in the order in which they are joined into one function scope.
-const SCRIPTS: [&str; 14] = [
-    include_str!("page/math.js"),
+const SCRIPTS: [&str; 17] = [
+    include_str!("stage/math.js"),
+    include_str!("stage/shapes.js"),
+    include_str!("stage/pose.js"),
+    include_str!("stage/face.js"),
+    include_str!("stage/mesh.js"),
+    include_str!("stage/looks.js"),
+    include_str!("stage/shaders.js"),
+    include_str!("stage/lines.js"),
+    include_str!("stage/webgl.js"),
+    include_str!("stage/canvas2d.js"),
     include_str!("page/data.js"),
-    include_str!("page/pose.js"),
-    include_str!("page/shapes.js"),
-    include_str!("page/mesh.js"),
+    include_str!("page/trail.js"),
     include_str!("page/camera.js"),
-    include_str!("page/shaders.js"),
-    include_str!("page/lines.js"),
-    include_str!("page/webgl.js"),
-    include_str!("page/canvas2d.js"),
     include_str!("page/audio.js"),
     include_str!("page/timeline.js"),
     include_str!("page/hud.js"),
