@@ -8,6 +8,7 @@
 mod audio;
 mod bounded;
 mod bundle;
+mod clock;
 mod config;
 mod engine;
 mod error;

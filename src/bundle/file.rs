@@ -2,7 +2,7 @@
 
 use super::{CONFIG_KEY, corrupt, invalid};
 use crate::error::{Error, ErrorKind, Result};
-#[cfg(not(target_os = "android"))]
+#[cfg(not(any(target_os = "android", target_family = "wasm")))]
 use memmap2::Mmap;
 use safetensors::SafeTensors;
 use std::fs::File;
@@ -41,14 +41,14 @@ pub struct BundleFile<'a> {
 
 #[derive(Debug)]
 enum Bytes<'a> {
-    #[cfg(not(target_os = "android"))]
+    #[cfg(not(any(target_os = "android", target_family = "wasm")))]
     Mapped(Mmap),
     Owned(Vec<u8>),
     Borrowed(&'a [u8]),
 }
 
 impl<'a> BundleFile<'a> {
-    /// Maps the file at `path` (on Android: reads it): see [`LoadMode::Map`] for what must not
+    /// Maps the file at `path` (Android, WebAssembly: reads it): see [`LoadMode::Map`] for what must not
     /// happen to it meanwhile.
     ///
     /// # Errors
@@ -123,7 +123,7 @@ impl<'a> BundleFile<'a> {
 
     pub(super) fn as_slice(&self) -> &[u8] {
         match &self.bytes {
-            #[cfg(not(target_os = "android"))]
+            #[cfg(not(any(target_os = "android", target_family = "wasm")))]
             Bytes::Mapped(map) => map,
             Bytes::Owned(bytes) => bytes,
             Bytes::Borrowed(bytes) => bytes,
@@ -161,7 +161,7 @@ impl<'a> BundleFile<'a> {
 }
 
 /// `length` bytes of `file` from `offset` on.
-#[cfg(not(target_os = "android"))]
+#[cfg(not(any(target_os = "android", target_family = "wasm")))]
 fn contents(file: &File, offset: u64, length: usize) -> std::io::Result<Bytes<'static>> {
     use memmap2::MmapOptions;
     #[allow(unsafe_code, reason = "mapping a file is unsafe by nature")]
@@ -177,5 +177,15 @@ fn contents(file: &File, offset: u64, length: usize) -> std::io::Result<Bytes<'s
 fn contents(file: &File, offset: u64, length: usize) -> std::io::Result<Bytes<'static>> {
     let mut bytes = vec![0; length];
     std::os::unix::fs::FileExt::read_exact_at(file, &mut bytes, offset)?;
+    Ok(Bytes::Owned(bytes))
+}
+
+/// There are no maps: read, where the host has files at all.
+#[cfg(target_family = "wasm")]
+fn contents(mut file: &File, offset: u64, length: usize) -> std::io::Result<Bytes<'static>> {
+    use std::io::{Read, Seek, SeekFrom};
+    let mut bytes = vec![0; length];
+    file.seek(SeekFrom::Start(offset))?;
+    file.read_exact(&mut bytes)?;
     Ok(Bytes::Owned(bytes))
 }

@@ -26,6 +26,11 @@ pub enum Level {
     AvxVnni,
     /// AVX-512 F, BW, DQ, VL and VNNI (Ice Lake, Zen 4 and later).
     Avx512,
+    /// WebAssembly with 128-bit vectors, in modules that are built for them.
+    Simd128,
+    /// [`Simd128`](Self::Simd128) and relaxed vectors, in modules that are built for them and on
+    /// engines where they give our bits.
+    Relaxed,
 }
 
 /// Architecture and features of a level, handed to the macro `$then` with `$args`: the one list
@@ -45,6 +50,8 @@ macro_rules! features {
             $args
         }
     };
+    (Simd128, [$($then:tt)+] $args:tt) => { $($then)+! { "wasm32" ["simd128"] $args } };
+    (Relaxed, [$($then:tt)+] $args:tt) => { $($then)+! { "wasm32" ["simd128", "relaxed-simd"] $args } };
 }
 pub(crate) use features;
 
@@ -68,6 +75,7 @@ macro_rules! detected {
         #[cfg(not(target_arch = "aarch64"))]
         { false }
     }};
+    ("wasm32" [$($feature:tt),*] ()) => { cfg!(all(target_arch = "wasm32", $(target_feature = $feature),*)) };
 }
 
 /// Evaluates [`features`] with the level that `$level` is.
@@ -81,14 +89,25 @@ macro_rules! each_level {
             Level::Avx2 => features!(Avx2, [$then]()),
             Level::AvxVnni => features!(AvxVnni, [$then]()),
             Level::Avx512 => features!(Avx512, [$then]()),
+            Level::Simd128 => features!(Simd128, [$then]()),
+            Level::Relaxed => features!(Relaxed, [$then]()),
         }
     };
 }
 
 impl Level {
     /// Every level of every architecture, weakest first within one architecture.
-    pub const ALL: [Level; 7] =
-        [Self::Scalar, Self::Neon, Self::Dotprod, Self::I8mm, Self::Avx2, Self::AvxVnni, Self::Avx512];
+    pub const ALL: [Level; 9] = [
+        Self::Scalar,
+        Self::Neon,
+        Self::Dotprod,
+        Self::I8mm,
+        Self::Avx2,
+        Self::AvxVnni,
+        Self::Avx512,
+        Self::Simd128,
+        Self::Relaxed,
+    ];
 
     /// The name used by `VISAVIS_CPU` and in reports.
     pub fn name(self) -> &'static str {
@@ -100,6 +119,8 @@ impl Level {
             Self::Avx2 => "avx2",
             Self::AvxVnni => "avxvnni",
             Self::Avx512 => "avx512",
+            Self::Simd128 => "simd128",
+            Self::Relaxed => "relaxed",
         }
     }
 
@@ -119,6 +140,11 @@ impl Level {
 
     /// Whether this CPU can run it.
     pub fn is_available(self) -> bool {
+        // What relaxed instructions do is the engine's choice.
+        #[cfg(all(target_arch = "wasm32", target_feature = "relaxed-simd"))]
+        if self == Self::Relaxed {
+            return super::wasm::is_fused();
+        }
         each_level!(self, detected)
     }
 
@@ -172,6 +198,21 @@ impl Available {
 /// Proofs by the compiler: a token is made where code is compiled for its level, and nowhere else.
 pub(crate) mod token {
     macro_rules! token {
+        ("wasm32" [$($feature:tt),*] ($level:ident)) => {
+            /// Proof that this module has the level of this name.
+            #[cfg(all(target_arch = "wasm32", $(target_feature = $feature),*))]
+            #[derive(Clone, Copy)]
+            pub(crate) struct $level(());
+
+            #[cfg(all(target_arch = "wasm32", $(target_feature = $feature),*))]
+            impl $level {
+                /// The whole module is compiled for the level.
+                #[inline(always)]
+                pub(crate) fn here() -> Self {
+                    Self(())
+                }
+            }
+        };
         ($arch:tt [$($feature:tt),*] ($level:ident)) => {
             /// Proof that the CPU that runs this has the level of this name.
             #[cfg(target_arch = $arch)]
@@ -193,6 +234,8 @@ pub(crate) mod token {
     features!(Neon, [token](Neon));
     features!(Avx2, [token](Avx2));
     features!(Avx512, [token](Avx512));
+    features!(Simd128, [token](Simd128));
+    features!(Relaxed, [token](Relaxed));
 }
 
 /// Methods of a token, compiled for its level: `for LEVEL: fn name(self, ...) { ... }`. Their
@@ -235,8 +278,9 @@ mod tests {
 
     #[test]
     fn levels_include_those_they_are_built_on() {
-        use Level::{Avx2, Avx512, AvxVnni, Dotprod, I8mm, Neon};
-        let included = [(Dotprod, Neon), (I8mm, Neon), (I8mm, Dotprod), (AvxVnni, Avx2), (Avx512, Avx2)];
+        use Level::{Avx2, Avx512, AvxVnni, Dotprod, I8mm, Neon, Relaxed, Simd128};
+        let included =
+            [(Dotprod, Neon), (I8mm, Neon), (I8mm, Dotprod), (AvxVnni, Avx2), (Avx512, Avx2), (Relaxed, Simd128)];
         for (a, b) in Level::ALL.into_iter().flat_map(|a| Level::ALL.map(|b| (a, b))) {
             let expected = a == b || b == Level::Scalar || included.contains(&(a, b));
             assert_eq!(a.includes(b), expected, "{a} and {b}");

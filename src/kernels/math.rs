@@ -23,9 +23,14 @@ pub(crate) fn fold(mut v: Lanes) -> f32 {
 
 /// Rounds to nearest even by its own rounding error: for |x| < 2^22, x + MAGIC holds the integer in
 /// its low bits.
-const MAGIC: f32 = 12_582_912.0;
-const LN2_HI: f32 = 0.693_359_4;
-const LN2_LO: f32 = -2.121_944_4e-4;
+pub(crate) const MAGIC: f32 = 12_582_912.0;
+pub(crate) const LN2_HI: f32 = 0.693_359_4;
+pub(crate) const LN2_LO: f32 = -2.121_944_4e-4;
+pub(crate) const EXP_LOW: f32 = -87.0;
+pub(crate) const EXP_HIGH: f32 = 88.0;
+/// Of the Taylor polynomial, highest power first.
+pub(crate) const EXP_COEFFICIENTS: [f32; 8] =
+    [1.0 / 5040.0, 1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0];
 
 /// e^x with relative error below 2e-7 for x in [-87, 88]; clamped outside to e^-87 and e^88; NaN
 /// stays NaN.
@@ -34,14 +39,14 @@ const LN2_LO: f32 = -2.121_944_4e-4;
 /// is below 6e-9.
 #[inline(always)]
 pub(crate) fn exp(x: f32) -> f32 {
-    let x = if x < -87.0 { -87.0 } else { x };
-    let x = if x > 88.0 { 88.0 } else { x };
+    let x = if x < EXP_LOW { EXP_LOW } else { x };
+    let x = if x > EXP_HIGH { EXP_HIGH } else { x };
     let t = x.mul_add(std::f32::consts::LOG2_E, MAGIC);
     let n = t - MAGIC;
     let r = n.mul_add(-LN2_LO, n.mul_add(-LN2_HI, x));
-    let mut p = 1.0 / 5040.0;
-    for c in [1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0] {
-        p = r.mul_add(p, c);
+    let mut p = EXP_COEFFICIENTS[0];
+    for c in &EXP_COEFFICIENTS[1..] {
+        p = r.mul_add(p, *c);
     }
     p * f32::from_bits((t.to_bits() << 23).wrapping_add(0x3f80_0000))
 }
@@ -52,13 +57,15 @@ pub(crate) fn silu(x: f32) -> f32 {
     x / (1.0 + exp(-x))
 }
 
+/// -2 sqrt(2/pi), and times the cubic term's weight.
+pub(crate) const GELU_A: f32 = -2.0 * 0.797_884_6;
+pub(crate) const GELU_B: f32 = 0.044_715 * GELU_A;
+
 /// GELU in its tanh form, 0.5 x (1 + tanh(sqrt(2/pi) (x + 0.044715 x^3))), as x / (1 + e^(-2u))
 /// with u the argument of tanh.
 #[inline(always)]
 pub(crate) fn gelu(x: f32) -> f32 {
-    const A: f32 = -2.0 * 0.797_884_6; // sqrt(2/pi)
-    const B: f32 = 0.044_715 * A;
-    let e = exp(x * (x * x).mul_add(B, A));
+    let e = exp(x * (x * x).mul_add(GELU_B, GELU_A));
     x / (1.0 + e)
 }
 

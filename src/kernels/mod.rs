@@ -105,6 +105,8 @@ mod rows;
 mod split_rows;
 #[cfg(test)]
 mod testing;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod wasm;
 mod weights;
 mod workers;
 

@@ -149,6 +149,21 @@ macro_rules! variant {
         // SAFETY: a safe function without features.
         Some(unsafe { $crate::kernels::operation::Variant::new($crate::kernels::Level::$level, run, $about) })
     }};
+    ("wasm32" [$($feature:tt),*]
+     ($level:ident (fn($($arg:ident: $type:ty),*) $(-> $result:ty)?) ($($token:tt)*) $run:path, $about:expr)) => {{
+        #[cfg(all(target_arch = "wasm32", $(target_feature = $feature),*))]
+        {
+            // The whole module is compiled for the level.
+            fn entry($($arg: $type),*) $(-> $result)? {
+                $run($($token)* $($arg),*)
+            }
+            let run: unsafe fn($($type),*) $(-> $result)? = entry;
+            // SAFETY: a safe function, in a module that would not run without the features.
+            Some(unsafe { $crate::kernels::operation::Variant::new($crate::kernels::Level::$level, run, $about) })
+        }
+        #[cfg(not(all(target_arch = "wasm32", $(target_feature = $feature),*)))]
+        None
+    }};
     ($arch:tt [$($feature:tt),*]
      ($level:ident (fn($($arg:ident: $type:ty),*) $(-> $result:ty)?) ($($token:tt)*) $run:path, $about:expr)) => {{
         #[cfg(target_arch = $arch)]

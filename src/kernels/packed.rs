@@ -3,6 +3,7 @@
 use std::fmt;
 use std::ops::Range;
 
+#[cfg(target_os = "linux")]
 use memmap2::MmapMut;
 
 /// Output features of one panel: the lanes of one AVX-512 register of f32.
@@ -65,6 +66,7 @@ struct Line([u8; 64]);
 
 /// Page size that large buffers ask the system for: fewer address translations while weights stream
 /// by.
+#[cfg(any(test, target_os = "linux"))]
 const HUGE: usize = 2 << 20;
 
 /// Zeroed, 64-byte aligned memory, viewed as bytes, integers or floats.
@@ -76,11 +78,13 @@ pub(crate) struct Buffer {
 enum Store {
     Lines(Vec<Line>),
     /// A mapping, and where in it the buffer begins: large ones at a multiple of [`HUGE`].
+    #[cfg(target_os = "linux")]
     Pages(MmapMut, usize),
 }
 
 /// Smallest buffer in pages of its own, bytes. Weights that live long do not lie between what
 /// loading took and gave back, so an allocator can return that.
+#[cfg(any(test, target_os = "linux"))]
 const OWN_PAGES: usize = 1 << 16;
 
 impl Buffer {
@@ -93,9 +97,9 @@ impl Buffer {
 
     /// Buffers in pages of their own: huge ones, as far as they fill them; the system may decline,
     /// which costs speed alone.
+    #[cfg(target_os = "linux")]
     fn pages(bytes: usize) -> Option<Store> {
-        // Elsewhere a mapping has nothing over the allocator.
-        if bytes < OWN_PAGES || cfg!(not(target_os = "linux")) {
+        if bytes < OWN_PAGES {
             return None;
         }
         if bytes < HUGE {
@@ -103,9 +107,14 @@ impl Buffer {
         }
         let map = MmapMut::map_anon(bytes + HUGE).ok()?;
         let from = map.as_ptr().align_offset(HUGE);
-        #[cfg(target_os = "linux")]
         let _ = map.advise_range(memmap2::Advice::HugePage, from, bytes / HUGE * HUGE);
         (from <= HUGE).then_some(Store::Pages(map, from))
+    }
+
+    /// A mapping has nothing over the allocator.
+    #[cfg(not(target_os = "linux"))]
+    fn pages(_bytes: usize) -> Option<Store> {
+        None
     }
 
     pub(crate) fn bytes(&self) -> usize {
@@ -115,6 +124,7 @@ impl Buffer {
     fn start(&self) -> *const u8 {
         match &self.store {
             Store::Lines(lines) => lines.as_ptr().cast(),
+            #[cfg(target_os = "linux")]
             Store::Pages(map, from) => map[*from..].as_ptr(),
         }
     }
@@ -130,6 +140,7 @@ impl Buffer {
     pub(crate) fn of_mut<T: Plain>(&mut self) -> &mut [T] {
         let start: *mut u8 = match &mut self.store {
             Store::Lines(lines) => lines.as_mut_ptr().cast(),
+            #[cfg(target_os = "linux")]
             Store::Pages(map, from) => map[*from..].as_mut_ptr(),
         };
         // SAFETY: as in `of`, and `&mut self` makes it the only view.

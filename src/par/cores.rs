@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+#[cfg(not(any(target_os = "linux", target_os = "android")))]
+use crate::clock::Instant;
 use crate::error::{Error, ErrorKind, Result};
 
 /// The kernel's id of the calling thread (`gettid`), as Android's performance hints take it; `None`
@@ -56,8 +58,8 @@ pub(super) fn time_on_core() -> Duration {
     }
     #[cfg(not(any(target_os = "linux", target_os = "android")))]
     {
-        static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
-        START.get_or_init(std::time::Instant::now).elapsed()
+        static START: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
+        START.get_or_init(Instant::now).elapsed()
     }
 }
 

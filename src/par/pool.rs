@@ -5,12 +5,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError, mpsc};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::apart::Apart;
 use super::cores::{current_thread_id, time_on_core};
 use super::ledger::{Ledger, Stretch};
 use super::shared::{Next, Shared, Work};
+use crate::clock::Instant;
 use crate::error::Result;
 
 /// Pieces of one [`Pool::run`], at most.

@@ -7,9 +7,10 @@ use super::noise::Noise;
 use super::pipeline;
 use super::probe::Probe;
 use super::tools::Tools;
+use crate::clock::Instant;
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{BLOCK_FRAMES, FPS, Frame};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 impl Session {
     /// Computes the next block if it is due at `now` (session time, seconds) and returns its four

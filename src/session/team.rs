@@ -5,12 +5,12 @@ use super::block::Block;
 use super::governor::{Hold, Plan};
 use super::pipeline::{MEMBERS, compute};
 use super::tools::{Tools, Workspace};
+use crate::clock::Instant;
 use crate::engine::Engine;
 use crate::error::{Error, ErrorKind, Result};
 use crate::flow::SHARED_ROWS;
 use crate::kernels::Exec;
 use std::sync::Arc;
-use std::time::Instant;
 
 /// What it takes to step several sessions of one engine together: threads and working memory.
 ///

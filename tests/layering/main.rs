@@ -12,13 +12,14 @@ use std::path::Path;
 const ROOMS: &[(&str, &str, &[&str])] = &[
     ("error", "the one error type", &[]),
     ("bounded", "reading files, never more than was agreed", &[]),
+    ("clock", "when a block began, and how long it took", &[]),
     ("frame", "what passes between stages and to the caller", &["error"]),
     ("queue", "records between threads that do not wait", &[]),
     ("scheme", "how weights are stored", &[]),
     ("rig", "the skeleton", &["error", "frame"]),
     ("normaliser", "the networks' scale and that of metres", &["error"]),
     ("config", "what a bundle says about itself", &["rig", "scheme"]),
-    ("par", "two threads", &["error"]),
+    ("par", "two threads", &["clock", "error"]),
     ("kernels", "arithmetic", &["error", "par", "scheme"]),
     ("nn", "passes through transformer layers", &["kernels"]),
     ("user", "the user's head", &["frame", "queue"]),
@@ -35,7 +36,7 @@ const ROOMS: &[(&str, &str, &[&str])] = &[
     (
         "session",
         "one conversation",
-        &["audio", "config", "engine", "error", "flow", "frame", "kernels", "normaliser", "par", "pose", "user", "vae"],
+        &["audio", "clock", "config", "engine", "error", "flow", "frame", "kernels", "normaliser", "par", "pose", "user", "vae"],
     ),
     (
         "quant",

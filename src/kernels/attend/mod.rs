@@ -13,7 +13,7 @@ use super::operation::operation;
 mod batch;
 mod cache;
 mod scalar;
-#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64", target_feature = "simd128"))]
 mod simd;
 #[cfg(test)]
 mod tests;
@@ -27,7 +27,7 @@ operation! {
     /// values, and the rows' queries, are what [`Head::check`] accepts.
     Attend = "attend", (fn(head: HeadOf<'_>, rows: &mut [Row<'_>]));
     (Scalar => scalar::run)
-    (Neon, Avx2, Avx512 => simd::run, token)
+    (Neon, Avx2, Avx512, Simd128, Relaxed => simd::run, token)
 }
 
 /// Tokens between two updates of the running maximum.

@@ -29,7 +29,8 @@ pub(super) fn row<T: Stored>(head: &Head<'_, T>, row: &mut Row<'_>) {
         for (t, p) in p[..tokens].iter_mut().enumerate() {
             *p = dot(row.q, &head.k[head.at(row, row.shift + start + t)..][..n]) * scale;
         }
-        let (keep, new_top) = online_softmax(&mut p, tokens, top);
+        let exp_of = |p: &mut [f32; CHUNK], top| p.iter_mut().for_each(|p| *p = exp(*p - top));
+        let (keep, new_top) = online_softmax(&mut p, tokens, top, exp_of);
         total = total.mul_add(keep, fold_chunk(&p));
         top = new_top;
         if start > 0 {
@@ -64,10 +65,15 @@ fn dot<T: Stored>(q: &[f32], k: &[T]) -> f32 {
 }
 
 /// One step of the online softmax: the scores of `tokens` of a chunk to weights relative to the new
-/// maximum, zeros behind them. Returns what weights relative to the old maximum, `top`, are to be
+/// maximum, zeros behind them; `exp_of` puts e^(p - top) in the place of each. Returns what weights relative to the old maximum, `top`, are to be
 /// multiplied by, and the new one.
 #[inline(always)]
-pub(super) fn online_softmax(p: &mut [f32; CHUNK], tokens: usize, top: f32) -> (f32, f32) {
+pub(super) fn online_softmax(
+    p: &mut [f32; CHUNK],
+    tokens: usize,
+    top: f32,
+    exp_of: impl Fn(&mut [f32; CHUNK], f32),
+) -> (f32, f32) {
     let larger = |m: f32, s: f32| if s > m { s } else { m };
     p[tokens..].fill(f32::NEG_INFINITY);
     let mut tops = [top; LANES];
@@ -77,9 +83,7 @@ pub(super) fn online_softmax(p: &mut [f32; CHUNK], tokens: usize, top: f32) -> (
         }
     }
     let new_top = tops.into_iter().fold(top, larger);
-    for p in p.iter_mut() {
-        *p = exp(*p - new_top);
-    }
+    exp_of(p, new_top);
     p[tokens..].fill(0.0);
     (exp(top - new_top), new_top)
 }

@@ -41,7 +41,7 @@ fn attend<L: F32x16, T: Stored>(level: L, head: &Head<'_, T>, rows: &mut [Row<'_
             if tokens > 0 {
                 let scale = 1.0 / (head.dim as f32).sqrt();
                 p[r].iter_mut().for_each(|p| *p *= scale);
-                let (keep, new_top) = online_softmax(&mut p[r], tokens, top[r]);
+                let (keep, new_top) = online_softmax(&mut p[r], tokens, top[r], |p, top| level.exp(p, top));
                 total[r] = total[r].mul_add(keep, fold_chunk(&p[r]));
                 top[r] = new_top;
                 if start > 0 {

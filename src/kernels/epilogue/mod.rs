@@ -13,6 +13,8 @@ use super::packed::{TILE_COLS, Tile};
 mod scalar;
 #[cfg(test)]
 mod tests;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod wasm;
 
 /// The sums of one row, or of the high and the low one that it was split into.
 #[derive(Clone, Copy)]
@@ -38,6 +40,19 @@ pub(crate) enum Sums<'a> {
     I32(RowSums<'a, i32>, f32, &'a [f32]),
 }
 
+impl Sums<'_> {
+    /// Those of column `at` and after.
+    #[allow(dead_code, reason = "some levels work on whole vectors first")]
+    pub(crate) fn from(self, at: usize) -> Self {
+        match self {
+            Self::F32(RowSums::Whole(sums), scale) => Self::F32(RowSums::Whole(&sums[at..]), scale),
+            Self::F32(RowSums::Split(sums), scale) => Self::F32(RowSums::Split(sums.map(|s| &s[at..])), scale),
+            Self::I32(RowSums::Whole(sums), x, w) => Self::I32(RowSums::Whole(&sums[at..]), x, &w[at..]),
+            Self::I32(RowSums::Split(sums), x, w) => Self::I32(RowSums::Split(sums.map(|s| &s[at..])), x, &w[at..]),
+        }
+    }
+}
+
 /// What to do with each finished value.
 #[derive(Clone, Copy)]
 pub(crate) enum Finish<'a> {
@@ -52,4 +67,5 @@ operation! {
     /// values.
     FinishRow = "epilogue", (fn(sums: Sums<'_>, bias: &[f32], finish: Finish<'_>, y: &mut [f32]));
     (Scalar, Neon, Avx2, Avx512 => scalar::run)
+    (Simd128, Relaxed => wasm::run, token)
 }

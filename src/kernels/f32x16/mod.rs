@@ -3,12 +3,16 @@
 
 use half::f16;
 
+use super::math;
+
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 #[cfg(target_arch = "aarch64")]
 mod neon;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod wasm;
 
 /// The floats' operations, all rounded as in scalar code; `fma` rounds once.
 pub(super) trait F32x16: Copy {
@@ -35,8 +39,14 @@ pub(super) trait F32x16: Copy {
     /// sum + a b
     fn fma(self, sum: Self::V, a: Self::V, b: Self::V) -> Self::V;
 
-    /// The sum of the lanes in the order of [`math::fold`](super::math::fold).
+    /// The sum of the lanes in the order of [`math::fold`].
     fn fold(self, v: Self::V) -> f32;
+
+    /// e^(v - top) in place of each v of whole registers.
+    #[inline(always)]
+    fn exp(self, values: &mut [f32], top: f32) {
+        values.iter_mut().for_each(|v| *v = math::exp(*v - top));
+    }
 
     /// Asks for the cache line at `line`, which may point anywhere.
     fn prefetch(self, line: *const u8);

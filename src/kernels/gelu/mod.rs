@@ -6,6 +6,8 @@ use super::operation::operation;
 mod scalar;
 #[cfg(test)]
 mod tests;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod wasm;
 
 /// Which activation.
 #[derive(Debug, Clone, Copy)]
@@ -20,4 +22,5 @@ operation! {
     /// Replaces each value of `x` by what the activation makes of it.
     Activate = "gelu", (fn(activation: Activation, x: &mut [f32]));
     (Scalar, Neon, Avx2, Avx512 => scalar::run)
+    (Simd128, Relaxed => wasm::run, token)
 }

@@ -7,7 +7,7 @@ use super::operation::operation;
 use super::packed::{FloatGeometry, Panels, Tile};
 
 pub(crate) mod scalar;
-#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64", target_feature = "simd128"))]
 pub(crate) mod simd;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -36,5 +36,5 @@ operation! {
     /// The product of a [`Job`] that [`Job::check`] accepts.
     MatmulF32F32 = "matmul_f32_f32", (fn(job: &Job<'_, f32>, tile: &mut Tile<f32>));
     (Scalar => scalar::run)
-    (Neon, Avx2, Avx512 => simd::run, token)
+    (Neon, Avx2, Avx512, Simd128, Relaxed => simd::run, token)
 }

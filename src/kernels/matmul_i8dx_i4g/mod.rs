@@ -30,6 +30,8 @@ mod neon;
 mod scalar;
 #[cfg(test)]
 mod tests;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod wasm;
 
 /// Where an int4 weight and its scale lie.
 #[derive(Debug, Clone, Copy)]
@@ -129,4 +131,5 @@ operation! {
     (Avx2 => avx2::run)
     (AvxVnni => avxvnni::run)
     (Avx512 => avx512::run)
+    (Simd128, Relaxed => wasm::run, token)
 }

@@ -27,6 +27,8 @@ mod neon;
 mod scalar;
 #[cfg(test)]
 mod tests;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod wasm;
 
 /// Order of the bytes of 16 outputs x 4 or 8 columns in packed weights, as a variant wants them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -144,4 +146,6 @@ operation! {
     (Avx2 => avx2::run, Layout::QuadsPaired)
     (AvxVnni => avxvnni::run, Layout::QuadsOffset)
     (Avx512 => avx512::run, Layout::QuadsOffset)
+    (Simd128 => wasm::exact, Layout::Quads)
+    (Relaxed => wasm::relaxed, Layout::Quads)
 }

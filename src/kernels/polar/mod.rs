@@ -11,9 +11,12 @@ use super::operation::operation;
 mod scalar;
 #[cfg(test)]
 mod tests;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod wasm;
 
 operation! {
     /// The nearest rotation of each matrix of `m`; `m` and `out` have equal lengths; row-major.
     Polar = "polar", (fn(m: &[[f32; 9]], out: &mut [[f32; 9]]));
     (Scalar, Neon, Avx2, Avx512 => scalar::run)
+    (Simd128, Relaxed => wasm::run, token)
 }

@@ -6,18 +6,17 @@ type V = [f32; LANES];
 
 /// Jacobi converges quadratically: off-diagonal entries reach rounding after four sweeps, even from
 /// repeated eigenvalues.
-const SWEEPS: usize = 5;
+pub(super) const SWEEPS: usize = 5;
+/// Entries that a sweep clears, in this order.
+pub(super) const PAIRS: [(usize, usize); 6] = [(0, 1), (2, 3), (0, 2), (1, 3), (0, 3), (1, 2)];
 
 #[inline(always)]
 pub(super) fn run(m: &[[f32; 9]], out: &mut [[f32; 9]]) {
     for (m, out) in m.chunks(LANES).zip(out.chunks_mut(LANES)) {
         let mut a = [[0.0f32; LANES]; 9];
         for (lane, m) in m.iter().enumerate() {
-            // Scaled to a largest entry of 1: products neither overflow nor vanish.
-            let top = m.iter().fold(0.0f32, |t, v| t.max(v.abs()));
-            let finite = m.iter().all(|v| v.is_finite()) && top > 0.0;
-            for (i, v) in m.iter().enumerate() {
-                a[i][lane] = if finite { v / top } else { f32::from(i % 4 == 0) };
+            for (a, v) in a.iter_mut().zip(scaled(m)) {
+                a[lane] = v;
             }
         }
         let r = block(&a);
@@ -27,6 +26,19 @@ pub(super) fn run(m: &[[f32; 9]], out: &mut [[f32; 9]]) {
             }
         }
     }
+}
+
+/// Scaled to a largest entry of 1, so that products neither overflow nor vanish; the identity where
+/// that cannot be.
+#[inline(always)]
+pub(super) fn scaled(m: &[f32; 9]) -> [f32; 9] {
+    let top = m.iter().fold(0.0f32, |t, v| t.max(v.abs()));
+    let finite = m.iter().all(|v| v.is_finite()) && top > 0.0;
+    let mut out = [0.0; 9];
+    for (i, (out, v)) in out.iter_mut().zip(m).enumerate() {
+        *out = if finite { v / top } else { f32::from(i % 4 == 0) };
+    }
+    out
 }
 
 #[inline(always)]
@@ -61,7 +73,7 @@ fn block(a: &[V; 9]) -> [V; 9] {
         row[i] = [1.0; LANES];
     }
     for _ in 0..SWEEPS {
-        for (p, q) in [(0, 1), (2, 3), (0, 2), (1, 3), (0, 3), (1, 2)] {
+        for (p, q) in PAIRS {
             rotate(&mut k, &mut v, p, q);
         }
     }

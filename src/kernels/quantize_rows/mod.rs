@@ -12,6 +12,8 @@ mod avx512;
 mod scalar;
 #[cfg(test)]
 mod tests;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+pub(super) mod wasm;
 
 pub(super) use scalar::{MAGIC, largest, scalable};
 
@@ -25,6 +27,7 @@ operation! {
     QuantizeRows = "quantize_rows", (fn(x: &[f32], q: &mut [i8], sums: &mut [i32]) -> f32);
     (Scalar, Neon, Avx2 => scalar::run)
     (Avx512 => avx512::run)
+    (Simd128 => wasm::run)
 }
 
 /// int8 rows as the integer products take them.

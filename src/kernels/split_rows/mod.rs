@@ -15,6 +15,8 @@ use super::operation::operation;
 mod scalar;
 #[cfg(test)]
 mod tests;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod wasm;
 
 /// What a step of the high row is worth in steps of the low one.
 pub(crate) const BASE: f32 = 254.0;
@@ -24,4 +26,5 @@ operation! {
     /// sums of their groups into `sums`; returns s.
     SplitRows = "split_rows", (fn(x: &[f32], q: [&mut [i8]; 2], sums: [&mut [i32]; 2]) -> f32);
     (Scalar, Neon, Avx2, Avx512 => scalar::run)
+    (Simd128 => wasm::run)
 }

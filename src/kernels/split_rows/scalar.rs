@@ -5,7 +5,7 @@ use crate::kernels::quantize_rows::{GROUP, MAGIC, largest, scalable};
 
 /// Largest magnitude of high and low, and of the integer that they make.
 const TOP: f32 = 127.0;
-const RANGE: f32 = BASE * TOP;
+pub(super) const RANGE: f32 = BASE * TOP;
 
 #[inline(always)]
 pub(super) fn run(x: &[f32], [high, low]: [&mut [i8]; 2], [high_sums, low_sums]: [&mut [i32]; 2]) -> f32 {

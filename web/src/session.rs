@@ -1,0 +1,186 @@
+//! Sessions: one conversation.
+
+use crate::frames::Block;
+use crate::status::{refuse, status, tell};
+use crate::{engine, options, slice, stats};
+use visavis::glam::Vec3;
+use visavis::{Engine, Result, Session, Speaker, VoiceInput};
+
+/// One conversation with one user, and its last block.
+pub struct Conversation {
+    session: Session,
+    block: Block,
+}
+
+/// Runs `body` on a session.
+///
+/// # Safety
+/// It is alive, and nobody else is inside it: a module has one thread.
+unsafe fn with(session: *mut Conversation, body: impl FnOnce(&mut Session) -> Result<()>) -> i32 {
+    // SAFETY: the caller's promise.
+    status(body(unsafe { &mut (*session).session }))
+}
+
+/// Runs `body` on a voice (0 the agent's, 1 the user's).
+///
+/// # Safety
+/// As [`with`].
+unsafe fn with_voice(session: *mut Conversation, voice: i32, body: impl FnOnce(VoiceInput) -> Result<()>) -> i32 {
+    // SAFETY: the caller's promise.
+    unsafe { with(session, |s| body(s.voice_input(Speaker::try_from(voice)?))) }
+}
+
+/// Starts a session with options in JSON (`options.rs`); null is an error, whose status goes to
+/// `status`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_new(
+    engine: *const Engine,
+    json: *const u8,
+    bytes: usize,
+    status: *mut i32,
+) -> *mut Conversation {
+    // SAFETY: the chapter on ownership, twice.
+    let (engine, json) = unsafe { (engine::shared(engine), slice(json, bytes)) };
+    let joints = engine.rig().len();
+    let (made, outcome) = match options::parse(json).and_then(|options| engine.session(options)) {
+        Ok(session) => (Box::into_raw(Box::new(Conversation { session, block: Block::new(joints) })), 0),
+        Err(error) => (std::ptr::null_mut(), refuse(&error)),
+    };
+    // SAFETY: room for a number, by the chapter on ownership.
+    unsafe { status.write(outcome) };
+    made
+}
+
+/// Frees a session.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_free(session: *mut Conversation) {
+    // SAFETY: made by `visavis_session_new`, not freed before.
+    drop(unsafe { Box::from_raw(session) });
+}
+
+/// Appends to a voice (0 the agent's, 1 the user's): mono samples, full scale 1, 8000 to 192000 Hz.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_push_voice(
+    session: *mut Conversation,
+    voice: i32,
+    samples: *const f32,
+    count: usize,
+    rate: u32,
+) -> i32 {
+    // SAFETY: the chapter on ownership, twice.
+    unsafe { with_voice(session, voice, |v| v.push(slice(samples, count), rate)) }
+}
+
+/// Ends an utterance: the last milliseconds, which wait in the resampler, come out.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_finish_voice(session: *mut Conversation, voice: i32) -> i32 {
+    let finish = |v: VoiceInput| {
+        v.finish();
+        Ok(())
+    };
+    // SAFETY: the chapter on ownership.
+    unsafe { with_voice(session, voice, finish) }
+}
+
+/// Drops all of a voice that has not been used: an utterance is broken off.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_clear_voice(session: *mut Conversation, voice: i32) -> i32 {
+    let clear = |v: VoiceInput| {
+        v.clear();
+        Ok(())
+    };
+    // SAFETY: the chapter on ownership.
+    unsafe { with_voice(session, voice, clear) }
+}
+
+/// Makes a voice present, silent until something is pushed, or absent until the next push.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_set_voice_present(session: *mut Conversation, voice: i32, present: i32) -> i32 {
+    let set = |v: VoiceInput| {
+        v.set_present(present != 0);
+        Ok(())
+    };
+    // SAFETY: the chapter on ownership.
+    unsafe { with_voice(session, voice, set) }
+}
+
+/// Tells where the user's head is: midpoint of the eyes, world metres, at `time` seconds.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_push_head(session: *mut Conversation, x: f32, y: f32, z: f32, time: f64) -> i32 {
+    // SAFETY: the chapter on ownership.
+    unsafe { with(session, |s| s.push_user_head(Vec3::new(x, y, z), time)) }
+}
+
+/// Sets the gaze target, -1 to 1; NaN leaves the gaze free.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_set_gaze(session: *mut Conversation, target: f32) -> i32 {
+    // SAFETY: the chapter on ownership.
+    unsafe { with(session, |s| s.set_gaze((!target.is_nan()).then_some(target))) }
+}
+
+/// Sets the sampler of the coming blocks by its name.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_set_sampler(session: *mut Conversation, name: *const u8, bytes: usize) -> i32 {
+    // SAFETY: the chapter on ownership.
+    let name = String::from_utf8_lossy(unsafe { slice(name, bytes) });
+    // SAFETY: the same.
+    unsafe { with(session, |s| s.set_sampler(name.parse()?)) }
+}
+
+/// Sets the milliseconds that a block may take, 1 to 133.3; 0: the session's sampler, always.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_set_budget(session: *mut Conversation, milliseconds: f32) -> i32 {
+    // SAFETY: the chapter on ownership.
+    unsafe { with(session, |s| s.set_governor(visavis::Governor::within(milliseconds))) }
+}
+
+/// Starts anew, as if just made.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_reset(session: *mut Conversation) -> i32 {
+    // SAFETY: the chapter on ownership.
+    unsafe { with(session, Session::reset) }
+}
+
+/// Session time at which the next block is due, seconds.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_next_due(session: *const Conversation) -> f64 {
+    // SAFETY: the chapter on ownership.
+    unsafe { &*session }.session.next_due()
+}
+
+/// Computes the next block if it is due at `now`: 1, and the block lies at [`visavis_numbers`] and
+/// [`visavis_joints`]; 0 if none is due; minus the status of an error.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_poll(session: *mut Conversation, now: f64) -> i32 {
+    // SAFETY: the chapter on ownership.
+    let conversation = unsafe { &mut *session };
+    match conversation.session.poll(now) {
+        Ok(Some(frames)) => {
+            conversation.block.fill(frames);
+            1
+        }
+        Ok(None) => 0,
+        Err(error) => -refuse(&error),
+    }
+}
+
+/// Numbers of the last block's frames, f64.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_numbers(session: *const Conversation) -> *const f64 {
+    // SAFETY: the chapter on ownership.
+    unsafe { &*session }.block.numbers().as_ptr()
+}
+
+/// Joints of the last block's frames, f32.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_joints(session: *const Conversation) -> *const f32 {
+    // SAFETY: the chapter on ownership.
+    unsafe { &*session }.block.joints().as_ptr()
+}
+
+/// Tells the session's statistics as JSON.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_stats(session: *const Conversation) {
+    // SAFETY: the chapter on ownership.
+    tell(stats::json(&unsafe { &*session }.session.stats()));
+}

@@ -1,0 +1,158 @@
+//! The module's interface, natively: the digests of motion that `tests/digests.test.js` compares
+//! with, in `tests/digests.txt`. `VISAVIS_DIGESTS=write` rewrites it where numbers were meant to
+//! change.
+
+use crate::*;
+use std::fmt::Write;
+use std::path::Path;
+use visavis::{BLOCK_FRAMES, Engine};
+
+const AGENT_RATE: usize = 48_000;
+const USER_RATE: usize = 16_000;
+
+fn text() -> String {
+    // SAFETY: the text of the last call, which nobody changes meanwhile.
+    let bytes = unsafe { slice(visavis_text(), visavis_text_length()) };
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+fn engine(path: &str) -> *const Engine {
+    let bytes = std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)).unwrap();
+    let mut status = 0;
+    // SAFETY: bytes and status outlive the call.
+    let engine = unsafe { visavis_engine_new(bytes.as_ptr(), bytes.len(), &mut status) };
+    assert_eq!(status, 0, "{}", text());
+    engine
+}
+
+fn session(engine: *const Engine, options: &str) -> Result<*mut Conversation, (i32, String)> {
+    let mut status = 0;
+    // SAFETY: all outlives the call.
+    let session = unsafe { visavis_session_new(engine, options.as_ptr(), options.len(), &mut status) };
+    if status == 0 { Ok(session) } else { Err((status, text())) }
+}
+
+/// Noise in bursts, of whole numbers: JavaScript makes the same (`tests/scene.js`).
+fn voice(seed: u32, samples: usize, rate: usize) -> Vec<f32> {
+    let mut state = seed;
+    let noise = |i: usize| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let value = (state >> 16) as f32 / 65_536.0 - 0.5;
+        if (4 * i / rate) % 3 == 2 { 0.0 } else { 0.5 * value }
+    };
+    (0..samples).map(noise).collect()
+}
+
+/// Sample `n` of a head that walks to and fro, 72 a second.
+fn head(n: usize) -> [f64; 3] {
+    let p = n % 576;
+    let way = p.min(576 - p) as f64 / 144.0 - 1.0;
+    [way, 1.6, 1.5 + 0.25 * way]
+}
+
+/// FNV-1a of 32-bit words in two lanes.
+struct Digest([u32; 2]);
+
+impl Digest {
+    fn add(&mut self, word: u32) {
+        self.0[0] = (self.0[0] ^ word).wrapping_mul(0x0100_0193);
+        self.0[1] = (self.0[1] ^ word.rotate_left(16)).wrapping_mul(0x0100_0193);
+    }
+}
+
+fn motion(engine: *const Engine, options: &str, blocks: usize) -> String {
+    let conversation = session(engine, options).unwrap();
+    // SAFETY: alive.
+    let joints = unsafe { &*engine }.rig().len();
+    let seconds = blocks * 4 / 30 + 1;
+    let (agent, user) = (voice(1, seconds * AGENT_RATE, AGENT_RATE), voice(2, seconds * USER_RATE, USER_RATE));
+    let mut digest = Digest([0x811c_9dc5, 0x811c_9dc5 ^ 0xffff]);
+    // SAFETY: the session is alive until it is freed; the voices outlive the pushes.
+    unsafe {
+        for (number, voice, rate) in [(0, &agent, AGENT_RATE), (1, &user, USER_RATE)] {
+            assert_eq!(visavis_push_voice(conversation, number, voice.as_ptr(), voice.len(), rate as u32), 0);
+        }
+        for n in 0..seconds * 72 {
+            let [x, y, z] = head(n).map(|v| v as f32);
+            assert_eq!(visavis_push_head(conversation, x, y, z, n as f64 / 72.0), 0);
+        }
+        for _ in 0..blocks {
+            assert_eq!(visavis_poll(conversation, visavis_next_due(conversation)), 1, "{}", text());
+            for v in slice(visavis_numbers(conversation), BLOCK_FRAMES * FRAME_NUMBERS) {
+                // What is not a number has no bits that JavaScript would keep.
+                let bits = if v.is_nan() { 0 } else { v.to_bits() };
+                digest.add(bits as u32);
+                digest.add((bits >> 32) as u32);
+            }
+            let joints = slice(visavis_joints(conversation), BLOCK_FRAMES * joints * JOINT_NUMBERS);
+            joints.iter().for_each(|v| digest.add(v.to_bits()));
+        }
+        visavis_session_free(conversation);
+    }
+    format!("{:08x}{:08x}", digest.0[0], digest.0[1])
+}
+
+#[test]
+fn motion_is_that_of_the_file_that_webassembly_is_compared_with() {
+    let mut lines =
+        String::from("# Bundle, blocks, options, digest. src/tests.rs computes them; VISAVIS_DIGESTS=write rewrites.\n");
+    let tiny = "tests/goldens/tiny.safetensors";
+    let shipped = "models/visavis-base-i8.safetensors";
+    let cases = [
+        (tiny, 24, r#"{"sampler":"midpoint4"}"#),
+        (tiny, 24, r#"{"sampler":"midpoint2","gaze":0.8,"seed":7}"#),
+        (tiny, 24, r#"{"sampler":"midpoint1","gaze":0.8}"#),
+        (tiny, 24, r#"{"sampler":"euler:5","gaze":0.25,"guidance":3}"#),
+        (tiny, 24, r#"{"sampler":"single","start":[1,2,0.5]}"#),
+        (shipped, 100, r#"{"sampler":"single"}"#),
+        (shipped, 20, r#"{"sampler":"midpoint4","gaze":0.8}"#),
+    ];
+    let (mut engine_of, mut loaded) = ("", std::ptr::null());
+    for (bundle, blocks, options) in cases {
+        if bundle != engine_of {
+            (engine_of, loaded) = (bundle, engine(bundle));
+        }
+        writeln!(lines, "{bundle} {blocks} {options} {}", motion(loaded, options, blocks)).unwrap();
+    }
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/digests.txt");
+    if std::env::var("VISAVIS_DIGESTS").is_ok_and(|v| v == "write") {
+        std::fs::write(&path, &lines).unwrap();
+    }
+    assert_eq!(lines, std::fs::read_to_string(path).unwrap(), "left: this machine; right: the file");
+}
+
+#[test]
+fn what_is_wrong_has_a_status_and_a_text() {
+    let mut status = 0;
+    // SAFETY: all outlives the calls; what is not null is alive.
+    unsafe {
+        assert!(visavis_engine_new(b"no bundle".as_ptr(), 9, &mut status).is_null());
+        assert_eq!(status, 3, "{}", text());
+        let engine = engine("tests/goldens/tiny.safetensors");
+        visavis_engine_facts(engine);
+        assert!(text().contains(r#""fps":30,"blockFrames":4"#), "{}", text());
+        for (options, part) in [
+            ("{", "options of the session"),
+            (r#"{"colour":1}"#, "unknown field `colour`"),
+            (r#"{"sampler":"best"}"#, "unknown sampler"),
+            (r#"{"gaze":2}"#, "gaze target 2"),
+        ] {
+            let (status, text) = session(engine, options).unwrap_err();
+            assert_eq!(status, 1);
+            assert!(text.contains(part), "{text}");
+        }
+        let conversation = session(engine, "{}").unwrap();
+        visavis_engine_free(engine);
+        assert_eq!(visavis_push_voice(conversation, 0, [0.0_f32; 4].as_ptr(), 4, 1), 6, "{}", text());
+        assert_eq!(visavis_push_voice(conversation, 2, std::ptr::null(), 0, 48_000), 1, "{}", text());
+        assert_eq!(visavis_poll(conversation, f64::NAN), -1, "{}", text());
+        assert_eq!(visavis_poll(conversation, 0.0), 1);
+        assert_eq!(visavis_poll(conversation, 0.0), 0);
+        visavis_stats(conversation);
+        assert!(text().contains(r#""blocks":1,"#), "{}", text());
+        visavis_session_free(conversation);
+        let memory = visavis_alloc(13);
+        assert!(memory.cast::<u64>().is_aligned());
+        visavis_free(memory, 13);
+    }
+}

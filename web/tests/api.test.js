@@ -1,0 +1,189 @@
+// What the package promises to a page, in Node.
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import test from "node:test";
+import { Visavis, VisavisError, load, root } from "./load.js";
+import { fill } from "./scene.js";
+
+const kind = (wanted, part) => (error) => {
+  assert.ok(error instanceof VisavisError, `${error}`);
+  assert.equal(error.kind, wanted, error.message);
+  if (part) assert.match(error.message, part);
+  return true;
+};
+
+test("an engine tells what it is", async () => {
+  const { facts, close } = await load();
+  assert.equal(facts.fps, 30);
+  assert.equal(facts.blockFrames, 4);
+  assert.equal(facts.joints[0].name, "hips");
+  assert.equal(facts.joints[0].parent, null);
+  assert.match(facts.level, /simd128|relaxed/);
+  void close;
+});
+
+test("bundles that are none are refused, and say why", async () => {
+  await assert.rejects(load({ bundle: new Uint8Array(9) }), kind("bundle-corrupt"));
+  const cut = readFileSync(new URL("tests/goldens/tiny.safetensors", root));
+  await assert.rejects(load({ bundle: cut.subarray(0, cut.length / 2) }), kind("bundle-corrupt"));
+  await assert.rejects(Visavis.load({}), kind("argument", /bundle/));
+  await assert.rejects(Visavis.load({ bundle: "file:///nowhere/at.all" }), kind("io", /nowhere/));
+  await assert.rejects(load({ module: "best" }), kind("argument", /relaxed/));
+});
+
+test("a bundle may be bytes, a view, a blob, a response or an address, and reports its progress", async () => {
+  const address = new URL("tests/goldens/tiny.safetensors", root);
+  const bytes = readFileSync(address);
+  const last = [];
+  for (const bundle of [bytes, new Blob([bytes]), new Response(bytes), address, address.href]) {
+    const engine = await Visavis.load({ bundle, onProgress: ({ loaded }) => last.push(loaded) });
+    engine.close();
+  }
+  assert.equal(last.at(-1), bytes.length);
+});
+
+test("frames come in order, in metres and unit quaternions", async () => {
+  const engine = await load();
+  const session = engine.session({ clock: "manual", sampler: "midpoint2", gaze: 0.8 });
+  const frames = [];
+  session.onFrames = (four) => frames.push(...four);
+  fill(session, 30);
+  await session.advance(2);
+  assert.equal(frames.length, 60);
+  frames.forEach((f, i) => {
+    assert.equal(f.index, i);
+    assert.ok(Math.abs(f.time - i / 30) < 1e-9);
+    assert.equal(f.sampler, "midpoint2");
+    assert.equal(f.joints.length, 11 * engine.facts.joints.length);
+    for (let j = 0; j < f.joints.length; j += 11) {
+      for (const at of [j, j + 7]) assert.ok(Math.abs(Math.hypot(...f.joints.subarray(at, at + 4)) - 1) < 1e-4);
+    }
+  });
+  assert.equal(frames[0].gaze, null);
+  assert.equal(typeof frames.at(-1).gaze, "number");
+  const shown = session.shown();
+  assert.ok(Math.abs(shown.frame.time - (2 - 4 / 30)) < 1.01 / 30, `${shown.frame.time}`);
+  const stats = await session.stats();
+  assert.equal(stats.blocks, 15);
+  assert.ok(stats.blockMs.p50 > 0 && stats.memoryBytes > 0 && stats.head.accepted > 0);
+  engine.close();
+});
+
+test("in real time a block comes every 133 ms, pauses stop it", async () => {
+  const engine = await load();
+  const session = engine.session({ sampler: "single" });
+  await session.ready;
+  const seen = [];
+  await new Promise((resolve) => {
+    session.onFrames = (frames) => seen.push(frames[0].time) >= 4 && resolve();
+  });
+  assert.deepEqual(seen.map((t) => Math.round(t * 30)), [0, 4, 8, 12]);
+  assert.ok(session.time >= 0.4, `${session.time}`);
+  session.pause();
+  const paused = session.time;
+  await new Promise((resolve) => setTimeout(resolve, 300));
+  assert.equal(session.time, paused);
+  const count = seen.length;
+  assert.ok(count <= 5, `${count} blocks`);
+  await session.resume();
+  await new Promise((resolve) => {
+    session.onFrames = resolve;
+  });
+  engine.close();
+});
+
+test("the agent's voice tells when it is heard, and can be broken off", async () => {
+  const engine = await load();
+  const session = engine.session({ clock: "manual" });
+  const second = new Float32Array(24000).fill(0.1);
+  assert.equal(await session.pushAgentVoice(second, 24000), 0);
+  assert.equal(await session.pushAgentVoice(second, 24000), 1);
+  await session.advance(0.5);
+  session.interrupt();
+  const starts = await session.pushAgentVoice(second, 24000);
+  assert.ok(Math.abs(starts - 16 / 30) < 1e-6, `${starts}`);
+  engine.close();
+});
+
+test("what is wrong is refused with its kind, what is only odd is counted", async () => {
+  const engine = await load();
+  await assert.rejects(engine.session({ sampler: "best" }).ready, kind("argument", /midpoint4/));
+  await assert.rejects(engine.session({ colour: 1 }).ready, kind("argument", /colour/));
+  assert.throws(() => engine.session({ clock: "sun" }), kind("argument"));
+  assert.throws(() => engine.session({ gaze: "much" }), kind("argument"));
+  const session = engine.session({ clock: "manual" });
+  assert.throws(() => session.pushUserVoice([0, 1], 48000), kind("argument", /Float32Array/));
+  assert.throws(() => session.pushUserVoice(new Float32Array(4), 7), kind("audio", /8000/));
+  assert.throws(() => session.pushUserVoice(new Float32Array(4), NaN), kind("audio"));
+  assert.throws(() => session.pushUserVoice(new Float32Array(8000 * 61), 8000), kind("audio", /minute/));
+  assert.throws(() => session.pushUserHead("1", 0, 0), kind("argument"));
+  assert.throws(() => session.setGaze(1.5), kind("argument", /-1 to 1/));
+  assert.throws(() => session.clearVoice("nobody"), kind("argument"));
+  await assert.rejects(session.setSampler("worst"), kind("argument"));
+  await assert.rejects(session.setBudget(-1), kind("argument"));
+  await assert.rejects(session.advance(-1), kind("argument"));
+  session.pushUserHead(NaN, 1.6, 1, 0);
+  session.pushUserHead(Infinity, 1.6, 1, 0);
+  let told = null;
+  session.onError = (error) => (told = error);
+  session.pushUserVoice(Float32Array.of(0, NaN, 0, Infinity), 48000);
+  await session.advance(0.2);
+  const stats = await session.stats();
+  assert.equal(stats.head.nonFinite, 2);
+  assert.equal(stats.userVoice.nonFiniteSamples, 2);
+  kind("audio")(told);
+  session.close();
+  assert.throws(() => session.pushUserHead(0, 1.6, 1), kind("closed"));
+  await assert.rejects(session.stats(), kind("closed"));
+  engine.close();
+  await assert.rejects(engine.session().ready, kind("closed"));
+});
+
+test("any values at all: an error of ours or none, and the session goes on", async () => {
+  const engine = await load();
+  const session = engine.session({ clock: "manual", sampler: "single" });
+  session.onError = (error) => assert.ok(error instanceof VisavisError && error.kind !== "fault", `${error}`);
+  const odd = [NaN, Infinity, -Infinity, 0, -0, 1e308, -1e308, 5e-324, 1.5, 2 ** 53, -1, null, undefined, "", "agent", {}, [], true, 10n, new Float32Array(3), () => 0];
+  let state = 7;
+  const pick = () => odd[(state = (Math.imul(state, 1664525) + 1013904223) >>> 0) % odd.length];
+  const calls = ["pushUserHead", "pushUserVoice", "pushAgentVoice", "finishVoice", "clearVoice", "setVoicePresent", "setGaze", "setSampler", "setBudget"];
+  for (let i = 0; i < 3000; i++) {
+    try {
+      await session[calls[i % calls.length]](pick(), pick(), pick(), pick());
+    } catch (error) {
+      assert.ok(error instanceof VisavisError && error.kind !== "fault", `${calls[i % calls.length]}: ${error.stack}`);
+    }
+  }
+  const before = (await session.stats()).blocks;
+  await session.advance(1);
+  assert.ok((await session.stats()).blocks > before);
+  engine.close();
+});
+
+test("memory is flat over an hour of motion", async () => {
+  const engine = await load();
+  const session = engine.session({ clock: "manual", sampler: "single" });
+  const minute = new Float32Array(60 * 8000).fill(0.01);
+  const memory = [];
+  for (let i = 0; i < 60; i++) {
+    session.pushUserVoice(minute, 8000);
+    for (let n = 0; n < 60; n++) session.pushUserHead(Math.sin(n), 1.6, 1.5, session.time + n);
+    await session.advance(60);
+    memory.push((await session.stats()).memoryBytes);
+  }
+  assert.equal(memory.at(-1), memory[1], memory.join(" "));
+  engine.close();
+});
+
+test("sessions leave nothing behind", async () => {
+  const engine = await load();
+  const memory = [];
+  for (let i = 0; i < 200; i++) {
+    const session = engine.session({ clock: "manual", sampler: "single" });
+    await session.advance(0.2);
+    memory.push((await session.stats()).memoryBytes);
+    session.close();
+  }
+  assert.equal(memory.at(-1), memory[10]);
+  engine.close();
+});
