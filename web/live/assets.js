@@ -38,8 +38,9 @@ export async function readAssets(tell) {
     }
   };
   tell(0.02, "Unpacking the agent.");
-  const [bundle, sound] = await Promise.all([part("bundle"), part("sound")]);
-  const { rate, names, lengths } = files?.lines ?? JSON.parse(text("lines")), pcm = new Int16Array(sound);
+  const [bundle, sound, relaxed, simd128, worker] = await Promise.all(["bundle", "sound", "relaxed", "simd128", "worker"].map(part));
+  const code = new TextDecoder().decode(worker);
+  const { rate, names, lengths } = files?.lines ?? JSON.parse(text("speech")), pcm = new Int16Array(sound);
   let at = 0;
   const lines = names.map((name, i) => {
     const samples = Float32Array.from(pcm.subarray(at, at + lengths[i]), (x) => x / 32768);
@@ -61,5 +62,10 @@ export async function readAssets(tell) {
     }
     return window.visavisAvatars;
   };
-  return { bundle, lines, avatars: () => (avatars ??= run()) };
+  // From disk a worker's script cannot be a file.
+  const startWorker = () => {
+    const url = URL.createObjectURL(new Blob([code], { type: "text/javascript" }));
+    try { return new Worker(url); } finally { URL.revokeObjectURL(url); }
+  };
+  return { bundle, wasm: { relaxed, simd128 }, worker: startWorker, lines, avatars: () => (avatars ??= run()) };
 }

@@ -5,9 +5,8 @@ const middle = (list, share) => (list.length ? [...list].sort((a, b) => a - b)[M
 const ms = (x) => (Number.isFinite(x) ? `${x.toFixed(1)} ms` : "–");
 
 export function createFigures({ agent, renderer, settings, state }) {
-  let spans = [], late = 0, blocks = 0;
+  let spans = [], late = 0;
   const figures = {
-    block() { blocks++; },
     frame(seconds, behind) {
       spans.push(1000 * seconds);
       if (spans.length > 600) spans.shift();
@@ -20,8 +19,8 @@ export function createFigures({ agent, renderer, settings, state }) {
     const s = await agent.session.stats(), { p50, p95, p99, max } = s.blockMs, { calls, triangles } = renderer.counts();
     const frame = middle(spans, 0.5);
     return [
-      ["Model", `${agent.name ?? "?"}, sampler ${settings.sampler}, gaze ${settings.gaze ?? "free"}`],
-      ["Module", agent.module],
+      ["Model", `${agent.facts.name}, sampler ${settings.sampler}, gaze ${settings.gaze ?? "free"}`],
+      ["Module", `${agent.facts.module} (${agent.facts.level}), visavis ${agent.facts.version}, ${(s.memoryBytes / 1e6).toFixed(0)} MB`],
       ["Block", `median ${ms(p50)}, 95 % ${ms(p95)}, 99 % ${ms(p99)}, worst ${ms(max)} of ${ms(1000 * BLOCK)}`],
       ["Speed", `${((1000 * BLOCK) / p50).toFixed(1)} times real time`],
       ["Blocks", `${s.blocks}, ${s.governor?.missed ?? 0} late`],

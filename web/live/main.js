@@ -45,14 +45,14 @@ async function start() {
   const settings = { gaze: options.has("gaze") ? Number(options.get("gaze")) : 0.8, sampler: options.get("sampler") ?? "midpoint4" };
   $("says").textContent = "Starting the agent.";
   const agent = await createAgent({
-    bundle: assets.bundle, ...settings, seed: Number(options.get("seed") ?? 1),
+    bundle: assets.bundle, wasm: assets.wasm, worker: assets.worker, ...settings, seed: Number(options.get("seed") ?? 1),
     onError: (error) => fail(`The agent stopped: ${explained(error)} Reload the page to go on.`),
   });
   assets.bundle = null;
   progress(1);
 
   // The rig as the stage takes it.
-  const rig = agent.rig, d = { joints: rig.joints, eyes: rig.eyes, headBack: rig.headBack, index: new Map(rig.joints.map(({ name }, j) => [name, j])), rest: [] };
+  const rig = agent.facts, d = { joints: rig.joints, eyes: rig.eyes, headBack: rig.headBack, index: new Map(rig.joints.map(({ name }, j) => [name, j])), rest: [] };
   for (const { parent, offset } of rig.joints) d.rest.push(parent === null ? [...offset] : add(d.rest[parent], offset));
   const canvas = $("scene"), shapes = createShapes(d), pose = createPose(d), face = createFace(d, shapes);
   const renderer = createWebgl(canvas, d, shapes, { xrCompatible: "xr" in navigator, powerPreference: "high-performance" });
@@ -67,7 +67,6 @@ async function start() {
   const figures = createFigures({ agent, renderer, settings, state: () => page.dataset });
   let over = 0, avatar = null;
   const microphone = createMicrophone(openContext, (samples, rate, level) => hear(samples, rate, level));
-  agent.onBlock = () => { voice.feed(); figures.block(); };
 
   function hear(samples, rate, level) {
     agent.session.pushUserVoice(samples, rate);
@@ -118,7 +117,7 @@ async function start() {
   $("gaze").addEventListener("input", () => setGaze(Number($("gaze").value)));
   $("free").addEventListener("change", () => setGaze($("free").checked ? null : Number($("gaze").value)));
   $("sampler").value = settings.sampler;
-  $("sampler").addEventListener("change", () => { settings.sampler = $("sampler").value; agent.session.setSampler(settings.sampler); figures.restart(); });
+  $("sampler").addEventListener("change", () => { settings.sampler = $("sampler").value; agent.session.setSampler(settings.sampler).catch((error) => notice(`No other sampler: ${explained(error)}`)); figures.restart(); });
   assets.lines.forEach(({ name, samples, rate }, i) => {
     const button = Object.assign(document.createElement("button"), { textContent: name, title: `Let it say this (${i + 1})` });
     button.addEventListener("click", () => say(samples, rate, name));
@@ -187,7 +186,7 @@ async function start() {
 
   // The picture ------------------------------------------------------------------------------------------------------------
   let before = performance.now(), ratio = Math.min(2, window.devicePixelRatio || 1), slow = 0, drawn = 0;
-  const tell = () => agent.session.pushUserHead(user.position);
+  const tell = () => agent.session.pushUserHead(...user.position);
 
   // Where the frame time is over what 60 a second allow for two seconds, fewer pixels are drawn.
   function adapt(seconds) {
@@ -212,7 +211,6 @@ async function start() {
     const seconds = (now - before) / 1000;
     before = now;
     const moment = agent.at(), level = voice.level();
-    voice.feed();
     pose.set(moment.from, moment.to, moment.share);
     root = { x: pose.root[0], z: pose.root[2], yaw: moment.from.yaw };
     pose.user = user.position;
@@ -252,10 +250,10 @@ async function start() {
   for (const [name, k] of [["x", 0], ["z", 2]]) if (options.has(name)) user.position[k] = Number(options.get(name));
   $("welcome").hidden = true;
   $("desk").hidden = false;
-  page.dataset.module = agent.module;
+  page.dataset.module = agent.facts.module;
   page.dataset.mode = "screen";
   requestAnimationFrame(loop);
   // For scripts in this window; other windows send messages (channel.js).
-  window.visavisLive = { agent, voice, user, xr, take, say, interrupt, setGaze, pose };
+  window.visavisLive = { agent, voice, user, xr, take, say, interrupt, setGaze, pose, behind: () => context && voice.behind(context) };
   if (!errors) page.dataset.state = "ready";
 }

@@ -14,7 +14,7 @@ mod atomic;
 mod bvh;
 mod gltf;
 #[cfg(test)]
-mod scratch;
+pub(crate) mod scratch;
 pub mod viewer;
 mod vrma;
 

@@ -26,6 +26,8 @@ pub struct Meta {
     /// Facts for the "about" panel as (name, value), plain text: model, sampler, seed, kernels,
     /// licence and so on.
     pub facts: Vec<(String, String)>,
+    /// Relative address of the live page, where it lies beside the recording.
+    pub live: Option<String>,
 }
 
 const PAGE: &str = include_str!("page/viewer.html");
@@ -59,7 +61,9 @@ pub fn render(recording: &Recording, meta: &Meta) -> String {
     let script = format!("(() => {{\n\"use strict\";\n{}\n}})();", SCRIPTS.join("\n"));
     let data = data::json(recording, meta);
     let title = escape_html(&meta.title);
-    fill(PAGE, &[("title", &title), ("style", STYLE), ("script", &script), ("data", &data)])
+    let link = |address: &String| format!("<a id=\"live\" href=\"{}\">Meet it live</a>", escape_html(address));
+    let live = meta.live.as_ref().map(link).unwrap_or_default();
+    fill(PAGE, &[("title", &title), ("live", &live), ("style", STYLE), ("script", &script), ("data", &data)])
 }
 
 /// Writes [`render`]'s page to `path`; the file appears whole or not at all.
