@@ -1,14 +1,14 @@
 #!/usr/bin/env node
 // usage: stage.mjs BUNDLE.safetensors OUT
-// What the demo's stage is drawn from: the live page's own body, made by the page's own scripts for the rig of a bundle, with its shaders and colours.
+// What the demo's stage is drawn from: the viewer's own body, made by its own scripts for the rig of a bundle, with its shaders and colours.
 // Little-endian, in the order of StageData.java.
 import { readFileSync, writeFileSync, openSync, readSync } from "node:fs";
 import { runInNewContext } from "node:vm";
 
 const [bundle, out] = process.argv.slice(2);
-const page = new URL("../../tools/src/export/viewer/page/", import.meta.url);
+const page = new URL("../../tools/src/export/viewer/stage/", import.meta.url);
 const names = "createShapes, headsetShapes, bodyMesh, headsetMesh, BODY_VERTEX, BODY_FRAGMENT, FLOOR_VERTEX, FLOOR_FRAGMENT, LINE_VERTEX, LINE_FRAGMENT, LOOKS, CAPSULES, add";
-const scripts = ["math.js", "shapes.js", "mesh.js", "shaders.js", "webgl.js"].map((name) => readFileSync(new URL(name, page), "utf8"));
+const scripts = ["math.js", "shapes.js", "mesh.js", "looks.js", "shaders.js"].map((name) => readFileSync(new URL(name, page), "utf8"));
 const viewer = runInNewContext(`${scripts.join("\n")}\n({ ${names} })`, { console });
 
 const file = openSync(bundle, "r");
@@ -27,7 +27,13 @@ const parts = [];
 const ints = (...values) => { const b = Buffer.alloc(4 * values.length); values.forEach((v, i) => b.writeInt32LE(v, 4 * i)); parts.push(b); };
 const floats = (values) => { const b = Buffer.alloc(4 * values.length); [...values].forEach((v, i) => b.writeFloatLE(v, 4 * i)); parts.push(b); };
 const text = (value) => { const b = Buffer.from(value); ints(b.length); parts.push(b); };
+// The app's face rests: what face.js would move rides on the head.
+const rest = (data) => {
+  const bytes = new Uint8Array(data), head = d.index.get("head") ?? 0;
+  for (let v = 0; v < bytes.length; v += 36) for (let k = 24; k < 28; k++) if (bytes[v + k] >= d.joints.length) bytes[v + k] = head;
+};
 const mesh = ({ data, indices }) => {
+  rest(data);
   ints(data.byteLength / 36, indices.length);
   parts.push(Buffer.from(data), Buffer.from(Uint8Array.from(new Uint8Array(indices.buffer))));
 };

@@ -46,7 +46,7 @@ val stageAsset by tasks.registering(Exec::class) {
     dependsOn(sampleAssets) // into the same folder, after it
     val model = file("../../models/visavis-base-i8.safetensors")
     val stage = layout.buildDirectory.dir("sampleAssets").get().asFile.resolve("stage.bin")
-    inputs.files(file("../apk/stage.mjs"), fileTree("../../tools/src/export/viewer/page"), model)
+    inputs.files(file("../apk/stage.mjs"), fileTree("../../tools/src/export/viewer/stage"), model)
     outputs.file(stage)
     commandLine("node", "../apk/stage.mjs", model.path, stage.path)
 }

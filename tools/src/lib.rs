@@ -12,6 +12,7 @@
 //! | [`report`] | what quantised bundles lose and cost |
 //! | [`soak`] | one session driven for hours |
 //! | [`mod@bench`] | block times, stages, memory |
+//! | [`serve`] | the live page's folder by the paths of requests |
 //! | [`trace`] | every stage of a session on disk |
 //!
 //! The runtime itself is the crate [`visavis`].
@@ -24,6 +25,7 @@ pub mod metrics;
 pub mod offline;
 pub mod recording;
 pub mod report;
+pub mod serve;
 pub mod soak;
 #[cfg(test)]
 mod synthetic;

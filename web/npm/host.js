@@ -61,6 +61,7 @@ export function serve(port) {
     #session;
     #origin; // Wall time of session time 0, ms; null: by hand or paused.
     #paused = null; // Session time at which it was paused.
+    #polled = 0; // Session time of the last poll: time does not run backwards.
     #ends = [0, 0]; // Session time at which all that was pushed of a voice has been heard.
 
     constructor(id, session, origin) {
@@ -74,8 +75,9 @@ export function serve(port) {
       let time = (now() - this.#origin) / 1000;
       const behind = time - this.#session.nextDue;
       if (behind > LOST) {
-        this.#origin += behind * 1000;
-        time = this.#session.nextDue;
+        const kept = Math.max(this.#session.nextDue, this.#polled);
+        this.#origin += (time - kept) * 1000;
+        time = kept;
         port.postMessage({ session: this.id, origin: this.#origin });
       }
       // One block at a time: messages come in between.
@@ -83,6 +85,7 @@ export function serve(port) {
     }
 
     #poll(time) {
+      this.#polled = time;
       const block = this.#session.poll(time);
       if (block) port.postMessage({ session: this.id, block }, [block]);
       return block !== null;
@@ -156,6 +159,7 @@ export function serve(port) {
 
     reset(origin) {
       this.#session.reset();
+      this.#polled = 0;
       this.#ends = [0, 0];
       this.#paused = null;
       if (this.#origin !== null) this.#origin = origin;

@@ -41,6 +41,8 @@ pub enum Command {
     Calibrate(super::calibrate::CalibrateArgs),
     /// Drives a session through hours of motion and judges memory, allocations, drift and precision
     Soak(super::soak::SoakArgs),
+    /// Serves the live page on this machine: meet the agent in a browser
+    Live(super::live::LiveArgs),
     /// Runs given conditioning and noise through a bundle and writes every stage
     Trace(TraceArgs),
 }

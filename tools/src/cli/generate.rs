@@ -28,7 +28,8 @@ pub fn generate(args: &RunArgs, talk: &Conversation, title: &str, subtitle: &str
     let outcome = offline::run(&mut session, talk, &mut |progress| line.show(progress))?;
     line.finish();
     let summary = Summary::of(&outcome.recording);
-    let meta = Meta { title: title.to_owned(), subtitle: subtitle.to_owned(), facts: args.facts(&engine) };
+    let live = out.live_page();
+    let meta = Meta { title: title.to_owned(), subtitle: subtitle.to_owned(), facts: args.facts(&engine), live };
     let paths = out.write(&outcome.recording, &meta, &summary)?;
     print(&report(args, &engine, &outcome, &summary, &paths))
 }

@@ -12,6 +12,7 @@ mod eval;
 mod files;
 mod generate;
 mod inspect;
+mod live;
 mod progress;
 mod quantize;
 mod report;
@@ -39,6 +40,7 @@ pub fn main() -> ExitCode {
             Command::Calibrate(args) => calibrate::run(&args),
             Command::Soak(args) => soak::run(&args),
             Command::Trace(args) => trace::run(&args),
+            Command::Live(args) => live::run(&args),
         },
         Err(e) => return usage(&e),
     };

@@ -15,7 +15,7 @@ mod bvh;
 mod gltf;
 pub(crate) mod replace;
 #[cfg(test)]
-mod scratch;
+pub(crate) mod scratch;
 pub mod viewer;
 mod vrma;
 

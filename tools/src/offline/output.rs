@@ -87,6 +87,14 @@ impl OutputFolder {
     }
 }
 
+impl OutputFolder {
+    /// Address, from the folder, of the live page in one file that `web/build.sh` leaves beside it.
+    pub fn live_page(&self) -> Option<String> {
+        const PAGE: &str = "../web/visavis.html";
+        self.folder.join(PAGE).is_file().then(|| PAGE.to_owned())
+    }
+}
+
 impl Drop for OutputFolder {
     fn drop(&mut self) {
         // Best effort: the error that led here is the one to report. Folders that hold something by

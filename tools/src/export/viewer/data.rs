@@ -247,6 +247,7 @@ mod tests {
             title: "</script><script>alert(1)</script><!-- \u{2028} \"quoted\" 안녕".into(),
             subtitle: "{{script}} <b>".into(),
             facts: vec![("a<b".into(), "\\".into())],
+            live: None,
         };
         let text = json(&recording(), &meta);
         assert!(!text.contains('<'));

@@ -1,6 +1,7 @@
 //! The viewer: one self-contained HTML file that plays a recording.
 //!
-//! The page (`page/`: markup, style, scripts by job) is compiled in; [`render`] joins it with the
+//! The page (`page/`: markup, style, scripts by job) and the stage that it shares with the live page
+//! (`stage/`: body, face, shaders, renderers) are compiled in; [`render`] joins it with the
 //! recording's data. The file needs no network and no library, opens from disk, and forbids itself
 //! any connection (Content-Security-Policy). Without WebGL 2 it draws on a 2-D canvas. Options
 //! after `#` in its address, joined by `&`, make views repeatable: `t=12.3` (seconds), `play`,
@@ -25,22 +26,27 @@ pub struct Meta {
     /// Facts for the "about" panel as (name, value), plain text: model, sampler, seed, kernels,
     /// licence and so on.
     pub facts: Vec<(String, String)>,
+    /// Relative address of the live page, where it lies beside the recording.
+    pub live: Option<String>,
 }
 
 const PAGE: &str = include_str!("page/viewer.html");
 const STYLE: &str = include_str!("page/viewer.css");
 /// Scripts in the order in which they are joined into one function scope.
-const SCRIPTS: [&str; 14] = [
-    include_str!("page/math.js"),
+const SCRIPTS: [&str; 17] = [
+    include_str!("stage/math.js"),
+    include_str!("stage/shapes.js"),
+    include_str!("stage/pose.js"),
+    include_str!("stage/face.js"),
+    include_str!("stage/mesh.js"),
+    include_str!("stage/looks.js"),
+    include_str!("stage/shaders.js"),
+    include_str!("stage/lines.js"),
+    include_str!("stage/webgl.js"),
+    include_str!("stage/canvas2d.js"),
     include_str!("page/data.js"),
-    include_str!("page/pose.js"),
-    include_str!("page/shapes.js"),
-    include_str!("page/mesh.js"),
+    include_str!("page/trail.js"),
     include_str!("page/camera.js"),
-    include_str!("page/shaders.js"),
-    include_str!("page/lines.js"),
-    include_str!("page/webgl.js"),
-    include_str!("page/canvas2d.js"),
     include_str!("page/audio.js"),
     include_str!("page/timeline.js"),
     include_str!("page/hud.js"),
@@ -55,7 +61,9 @@ pub fn render(recording: &Recording, meta: &Meta) -> String {
     let script = format!("(() => {{\n\"use strict\";\n{}\n}})();", SCRIPTS.join("\n"));
     let data = data::json(recording, meta);
     let title = escape_html(&meta.title);
-    fill(PAGE, &[("title", &title), ("style", STYLE), ("script", &script), ("data", &data)])
+    let link = |address: &String| format!("<a id=\"live\" href=\"{}\">Meet it live</a>", escape_html(address));
+    let live = meta.live.as_ref().map(link).unwrap_or_default();
+    fill(PAGE, &[("title", &title), ("live", &live), ("style", STYLE), ("script", &script), ("data", &data)])
 }
 
 /// Writes [`render`]'s page to `path`; the file appears whole or not at all.

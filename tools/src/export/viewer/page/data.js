@@ -32,6 +32,23 @@ function loadRecording() {
   return d;
 }
 
+// The frames about a time, as stage/pose.js takes them, and how far it is from the first to the second.
+function framesAt(d, time) {
+  const n = d.joints.length, exact = clamp(time * d.fps, 0, d.frames - 1), i = Math.floor(exact + 1e-6);
+  const frame = (k) => ({
+    root: [d.root[3 * k], d.root[3 * k + 1]],
+    hips: d.hips.subarray(3 * k, 3 * k + 3),
+    local: d.local.subarray(4 * n * k, 4 * n * (k + 1)),
+    gaze: d.gaze[k],
+    user: Number.isNaN(d.user[3 * k]) ? null : [...d.user.subarray(3 * k, 3 * k + 3)],
+  });
+  return { i, from: frame(i), to: frame(Math.min(i + 1, d.frames - 1)), share: Math.max(0, exact - i) };
+}
+
+// Decoded joint positions of a frame, before the rig's bone lengths were imposed.
+const decodedAt = (d, i) => d.joints.map((_, j) => [0, 1, 2].map((k) =>
+  d.decoded[3 * (i * d.joints.length + j) + k] * d.step + (k === 0 ? d.root[3 * i] : k === 2 ? d.root[3 * i + 1] : 0)));
+
 // Level of a voice in each frame, 0 to 1 of its own loud parts.
 function speechFrames(voice, d) {
   if (!voice) return null;

@@ -30,6 +30,7 @@ function start() {
   const canvas = $("scene");
   const shapes = createShapes(d), pose = createPose(d), pieces = trailPieces(d), audio = createAudio(d), hud = createHud(d);
   const camera = createCamera(d, canvas);
+  const face = createFace(d, shapes);
   const renderer = (options.has("fallback") ? null : createWebgl(canvas, d, shapes)) ?? createCanvas2d(canvas, d, shapes);
   const timeline = createTimeline($("lanes"), d, seek);
   page.dataset.renderer = renderer.name;
@@ -119,7 +120,7 @@ function start() {
   });
 
   // Drawing ----------------------------------------------------------------------------------------------------------
-  let pending = false;
+  let pending = false, shown = 0;
   function redraw() {
     if (pending) return;
     pending = true;
@@ -130,13 +131,21 @@ function start() {
     const ratio = Math.min(2, window.devicePixelRatio || 1), w = canvas.clientWidth, h = canvas.clientHeight;
     if (canvas.width !== Math.round(w * ratio)) canvas.width = Math.round(w * ratio);
     if (canvas.height !== Math.round(h * ratio)) canvas.height = Math.round(h * ratio);
-    pose.update(state.time);
+    if (d.frames) {
+      const { i, from, to, share } = framesAt(d, state.time);
+      pose.set(from, to, share);
+      pose.frame = i;
+      face.update(pose, state.time, d.speech.agent?.[i] ?? 0, state.playing ? state.time - shown : 0);
+      shown = state.time;
+    }
     const clean = page.hasAttribute("data-clean");
     const covered = clean ? 0 : $("transport").offsetHeight / Math.max(1, h);
     const view = camera.at(state.time, pose, canvas.width, canvas.height, covered * 0.95);
     const fromUser = camera.fromUser && pose.user !== null;
-    const lines = d.frames ? sceneLines(d, pose, pieces, { fromUser, joints: state.joints }) : [];
-    renderer.draw({ pose, view, lines, fromUser, joints: state.joints, theme: theme() });
+    const lines = d.frames ? sceneLines(d, pose, {
+      fromUser, trail: trailLines(d, pieces, pose.frame), colour: timeColour(pose.frame / d.frames), joints: state.joints ? decodedAt(d, pose.frame) : null,
+    }) : [];
+    renderer.draw({ pose, views: [view], lines, fromUser, joints: state.joints, theme: theme() });
     hud.draw(state.time, pose, fromUser || clean ? null : view, w, h);
     timeline.draw(state.time, theme());
     page.dataset.drawn = Number(page.dataset.drawn || 0) + 1;

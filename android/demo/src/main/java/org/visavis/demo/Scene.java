@@ -189,7 +189,7 @@ final class Scene {
     private void drawBodies(boolean there, float[] user) {
         common(bodyProgram);
         GLES20.glUniform3fv(GLES20.glGetUniformLocation(bodyProgram, "uEye"), 1, eye, 0);
-        GLES20.glUniform3fv(GLES20.glGetUniformLocation(bodyProgram, "uTints"), 7, data.tints, 0);
+        GLES20.glUniform3fv(GLES20.glGetUniformLocation(bodyProgram, "uTints"), 9, data.tints, 0);
         GLES20.glUniform3fv(GLES20.glGetUniformLocation(bodyProgram, "uClothes"), 3, data.clothes, 0);
         GLES20.glUniform4fv(GLES20.glGetUniformLocation(bodyProgram, "uCloth"), 1, data.cloth, 0);
         GLES20.glUniform1f(GLES20.glGetUniformLocation(bodyProgram, "uShade"), data.shade);
@@ -216,7 +216,7 @@ final class Scene {
         attribute(1, 3, GLES20.GL_FLOAT, false, stride, 12);
         attribute(2, 4, GLES20.GL_UNSIGNED_BYTE, false, stride, 24);
         attribute(3, 4, GLES20.GL_UNSIGNED_BYTE, true, stride, 28);
-        attribute(4, 2, GLES20.GL_UNSIGNED_BYTE, true, stride, 32);
+        attribute(4, 4, GLES20.GL_UNSIGNED_BYTE, true, stride, 32);
         GLES20.glDrawElements(GLES20.GL_TRIANGLES, count, GLES20.GL_UNSIGNED_INT, 0);
     }
 

@@ -12,7 +12,7 @@ final class StageData {
     static final String ASSET = "stage.bin";
     private static final int MAGIC = 0x47545356; // "VSTG"
 
-    /** Triangles; a vertex is 36 bytes: position, normal (f32), four bones, four weights (u8), tint, occlusion, two spare (u8). */
+    /** Triangles; a vertex is 36 bytes: position, normal (f32), four bones, four weights (u8), tint, occlusion, place on an eye (u8). */
     static final class Mesh {
         static final int STRIDE = 36;
         final ByteBuffer vertices;
@@ -69,7 +69,7 @@ final class StageData {
         grid = floats(in, 4);
         dark = in.getFloat();
         shade = in.getFloat();
-        tints = floats(in, 21);
+        tints = floats(in, 27);
         clothes = floats(in, 9);
         room = in.getInt();
         capsules = new Capsule[in.getInt()];

@@ -1,7 +1,12 @@
 // A person of round cones on the rig's rest pose. A shape: {bone, a, b, ra, rb, k (blend), s (squeeze of x, y, z), tint}.
 // Sizes are those of an adult whose eyes are 1.58 m above the floor, scaled to the rig's.
 
-const TINT = { body: 0, skin: 1, hair: 2, eye: 3, shell: 4, visor: 5, lips: 6 };
+const TINT = { body: 0, skin: 1, hair: 2, eye: 3, shell: 4, visor: 5, lips: 6, iris: 7, mouth: 8 };
+// Bones of the face, after the rig's joints: they ride on the head and are moved by face.js.
+const FACE_BONES = ["leftEye", "rightEye", "leftLid", "rightLid", "leftBrow", "rightBrow", "upperLip", "lowerLip", "mouth"];
+
+// Where the edges of the lids stand when the eye is open, degrees above straight ahead.
+const LIDS = { open: 30, lower: -30 };
 
 function createShapes(d) {
   const joint = (name) => d.index.get(name);
@@ -9,11 +14,14 @@ function createShapes(d) {
   const has = (...names) => names.every((name) => joint(name) !== undefined);
   const head = has("head") ? at("head") : [0, 1.5, 0];
   const u = Math.max(0.2, head[1] + d.eyes[1]) / 1.58;
-  const parts = { body: [], head: [], hair: [], eyes: [], mouth: [], leftHand: [], rightHand: [] };
+  const parts = { body: [], head: [], hair: [], eyes: [], lids: [], mouth: [], leftHand: [], rightHand: [] };
+  // Rest-pose centres about which the face's bones turn or stretch, by bone.
+  const pivots = {};
 
   const put = (part, bone, a, b, ra, rb, extra = {}) => {
-    if (!has(bone)) return;
-    parts[part].push({ bone: joint(bone), a, b, ra: ra * u, rb: rb * u, k: 0.03 * u, s: [1, 1, 1], ...extra });
+    const index = FACE_BONES.includes(bone) ? d.joints.length + FACE_BONES.indexOf(bone) : joint(bone);
+    if (index === undefined) return;
+    parts[part].push({ bone: index, a, b, ra: ra * u, rb: rb * u, k: 0.03 * u, s: [1, 1, 1], ...extra });
   };
   const from = (p, x, y, z) => add(p, [x * u, y * u, z * u]);
   const flat = (z, k = 0.05) => ({ s: [1, 1, z], k: k * u });
@@ -114,18 +122,31 @@ function createShapes(d) {
       while (!inside(q[2]) && q[2] > c[2]) q[2] -= 0.0015 * u;
       return from(q, 0, 0, out);
     };
-    const feature = (part, tint, r, ...points) => points.slice(1).forEach((q, i) =>
-      put(part, "head", face(...points[i]), face(...q), r, r, { tint, k: 0.002 * u }));
-    for (const x of [1, -1]) {
+    const feature = (part, bone, tint, r, ...points) => points.slice(1).forEach((q, i) =>
+      put(part, bone, face(...points[i]), face(...q), r, r, { tint, k: 0.002 * u }));
+    const plane = (n, q) => { const v = unit(n); return [...v, dot(v, q)]; };
+    for (const [side, x] of [["left", 1], ["right", -1]]) {
       put("head", "head", p(0.082 * x, 0.004, -0.008), p(0.079 * x, -0.03, -0.002), 0.017, 0.011, soft(0.008, [1.7, 1, 1]));
-      const eye = face(0.032 * x, 0, -0.0055);
-      put("eyes", "head", from(eye, 0, 0.0015, 0), from(eye, 0, -0.0015, 0), 0.0112, 0.0112, { tint: TINT.eye, k: 0.001 });
-      feature("mouth", TINT.hair, 0.0034, [0.046 * x, 0.02, 0], [0.034 * x, 0.0255, 0], [0.019 * x, 0.0225, 0]);
+      const eye = face(0.0325 * x, 0.001, -0.0072);
+      const ball = (part, bone, r, extra) => put(part, bone, eye, from(eye, 1e-5, 0, 0), r, r, { k: 0.001, ...extra });
+      pivots[`${side}Eye`] = pivots[`${side}Lid`] = eye;
+      ball("eyes", `${side}Eye`, 0.0125, { tint: TINT.eye, centre: eye });
+      // Lids are half balls around the eye, cut where they end: the upper one turns, the lower one stays.
+      const edge = (degrees) => [Math.cos((degrees * Math.PI) / 180), Math.sin((degrees * Math.PI) / 180)];
+      const [uc, us] = edge(LIDS.open), [lc, ls] = edge(LIDS.lower);
+      ball("lids", `${side}Lid`, 0.0138, { tint: TINT.skin, cut: plane([0.12 * x, -uc, us], eye) });
+      ball("lids", "head", 0.0136, { tint: TINT.skin, cut: plane([0, lc, -ls], eye) });
+      const brow = `${side}Brow`;
+      pivots[brow] = face(0.033 * x, 0.024, 0);
+      feature("mouth", brow, TINT.hair, 0.003, [0.047 * x, 0.0195, 0.0005], [0.036 * x, 0.0255, 0.0005], [0.019 * x, 0.0235, 0.0005]);
     }
-    feature("mouth", TINT.lips, 0.0036, [-0.021, -0.0655, -0.001], [-0.01, -0.069, 0], [0.01, -0.069, 0], [0.021, -0.0655, -0.001]);
+    pivots.mouth = face(0, -0.0662, 0);
+    pivots.upperLip = pivots.lowerLip = pivots.mouth;
+    feature("mouth", "mouth", TINT.mouth, 0.0034, [-0.0185, -0.0662, -0.0022], [0, -0.0668, -0.0008], [0.0185, -0.0662, -0.0022]);
+    feature("mouth", "upperLip", TINT.lips, 0.0031, [-0.0225, -0.0655, -0.0014], [-0.008, -0.0638, -0.0002], [0.008, -0.0638, -0.0002], [0.0225, -0.0655, -0.0014]);
+    feature("mouth", "lowerLip", TINT.lips, 0.0036, [-0.021, -0.0668, -0.0014], [-0.009, -0.0695, -0.0002], [0.009, -0.0695, -0.0002], [0.021, -0.0668, -0.0014]);
     // A cap of hair: a larger skull, cut away below the hairline and in front of the ears.
     const cut = { tint: TINT.hair, k: 0.012 * u, s: [1.18, 1, 1] };
-    const plane = (n, q) => { const v = unit(n); return [...v, dot(v, q)]; };
     put("hair", "head", p(0, 0.034, -0.016), p(0, 0.03, 0.004), h + 0.006, h + 0.001, { ...cut, cut: plane([0, -0.62, 1], p(0, 0.052, 0.062)) });
     put("hair", "head", p(0, 0.0, -0.03), p(0, -0.03, -0.038), h - 0.014, h - 0.03, { ...cut, cut: plane([0, -0.25, 1], p(0, 0, -0.012)) });
   }
@@ -134,6 +155,7 @@ function createShapes(d) {
   const wrist = has("leftHand") ? Math.abs(at("leftHand")[0]) : 1e3;
   return {
     parts,
+    pivots,
     all: Object.values(parts).flat(),
     unit: u,
     // Where the clothes end, in the rest pose: [soles, waist, collar (y)] and the cuffs (|x|).

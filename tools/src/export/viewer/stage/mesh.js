@@ -103,7 +103,7 @@ function appendSurface(mesh, shapes, cell, parents) {
   const field = distanceField(shapes, cell);
   const { points, faces } = surface(field);
   const base = mesh.count;
-  const near = (a, b) => a === b || parents[a] === b || parents[b] === a;
+  const near = (a, b) => a === b || (a < parents.length && b < parents.length && (parents[a] === b || parents[b] === a));
   for (const p of points) {
     const e = 0.75 * cell;
     const slope = (k) => { const q = [0, 0, 0]; q[k] = e; return field.sample(add(p, q)) - field.sample(sub(p, q)); };
@@ -120,24 +120,28 @@ function appendSurface(mesh, shapes, cell, parents) {
       const w = Math.exp((distances[nearest] - distances[i]) / 0.018);
       best.set(shape.bone, Math.max(best.get(shape.bone) || 0, w));
     });
-    pushVertex(mesh, p, normal, [...best].sort((x, y) => y[1] - x[1]).slice(0, 4), shapes[nearest].tint || 0, 1 - 0.26 * shade);
+    const { tint = 0, centre } = shapes[nearest];
+    const look = centre ? unit(sub(p, centre)) : [0, 0, 1];
+    pushVertex(mesh, p, normal, [...best].sort((x, y) => y[1] - x[1]).slice(0, 4), tint, 1 - (centre ? 0.1 : 0.26) * shade, look);
   }
   for (const f of faces) mesh.indices.push(base + f);
 }
 
-// A vertex is 36 bytes: position, normal (f32), four bones, four weights (u8), tint, occlusion, two spare (u8).
-function pushVertex(mesh, p, normal, weights, tint, occlusion) {
+// A vertex is 36 bytes: position, normal (f32), four bones, four weights (u8), tint, occlusion (u8), and for eyes where from their
+// centre it lies, x and y (-1 to 1 as u8; behind: off the iris).
+function pushVertex(mesh, p, normal, weights, tint, occlusion, look = [0, 0, 1]) {
   const total = weights.reduce((sum, [, w]) => sum + w, 0);
   const bones = [0, 0, 0, 0], shares = [0, 0, 0, 0];
   weights.forEach(([bone, w], i) => { bones[i] = bone; shares[i] = Math.round((255 * w) / total); });
   shares[0] += 255 - shares.reduce((sum, s) => sum + s, 0);
-  mesh.vertices.push([p, normal, bones, shares, tint, Math.round(255 * clamp(occlusion, 0, 1))]);
+  const side = look[2] < 0 ? unit([look[0], look[1], 0]) : look;
+  mesh.vertices.push([p, normal, bones, shares, tint, Math.round(255 * clamp(occlusion, 0, 1)), side]);
   mesh.count++;
 }
 
 function packMesh(mesh) {
   const data = new DataView(new ArrayBuffer(36 * mesh.count));
-  mesh.vertices.forEach(([p, n, bones, shares, tint, occlusion], i) => {
+  mesh.vertices.forEach(([p, n, bones, shares, tint, occlusion, look], i) => {
     for (let k = 0; k < 3; k++) {
       data.setFloat32(36 * i + 4 * k, p[k], true);
       data.setFloat32(36 * i + 12 + 4 * k, n[k], true);
@@ -148,6 +152,7 @@ function packMesh(mesh) {
     }
     data.setUint8(36 * i + 32, tint);
     data.setUint8(36 * i + 33, occlusion);
+    for (let k = 0; k < 2; k++) data.setUint8(36 * i + 34 + k, Math.round(127.5 + 127.5 * look[k]));
   });
   return { data: data.buffer, indices: new Uint32Array(mesh.indices) };
 }
@@ -157,12 +162,12 @@ const emptyMesh = () => ({ vertices: [], indices: [], count: 0 });
 function bodyMesh(d, shapes) {
   const mesh = emptyMesh();
   const parents = d.joints.map((joint) => joint.parent);
-  const { body, head, hair, eyes, mouth, leftHand, rightHand } = shapes.parts;
+  const { body, head, hair, eyes, lids, mouth, leftHand, rightHand } = shapes.parts;
   appendSurface(mesh, body, 0.014 * shapes.unit, parents);
   for (const part of [head, hair]) appendSurface(mesh, part, 0.0048 * shapes.unit, parents);
   for (const part of [leftHand, rightHand]) appendSurface(mesh, part, 0.0042 * shapes.unit, parents);
-  appendSurface(mesh, mouth, 0.0026 * shapes.unit, parents);
-  for (const eye of eyes) appendSurface(mesh, [eye], 0.003 * shapes.unit, parents);
+  for (const bone of new Set(mouth.map((s) => s.bone))) appendSurface(mesh, mouth.filter((s) => s.bone === bone), 0.0022 * shapes.unit, parents);
+  for (const part of [...eyes, ...lids]) appendSurface(mesh, [part], 0.0022 * shapes.unit, parents);
   // Linear blending thins bent joints: rigid balls inside keep elbows, knees, shoulders and hips full.
   for (const shape of body.filter((s) => s.ball)) {
     const r = shape.ball * shape.ra;

@@ -1,27 +1,24 @@
-// The pose at any time: forward kinematics on the fixed-bone-length rig, interpolated between frames.
+// The pose at a moment: forward kinematics on the fixed-bone-length rig, between two frames.
 
 function createPose(d) {
   const n = d.joints.length;
   const pose = {
-    frame: 0,
     position: d.joints.map(() => [0, 0, 0]),
     rotation: new Float32Array(4 * n),
-    // Three rows of four a joint: rest-pose point to world.
-    skin: new Float32Array(12 * n),
+    // Three rows of four a joint, then a bone of the face (face.js): rest-pose point to world.
+    skin: new Float32Array(12 * (n + FACE_BONES.length)),
     root: [0, 0, 0],
     user: null,
     gaze: NaN,
   };
   const local = new Float32Array(4);
 
-  const between = (track, i, k, f, width) => mix(track[i * width + k], track[Math.min(i + 1, d.frames - 1) * width + k], f);
-
-  function localRotation(j, i, f) {
-    const a = 4 * (i * n + j), b = 4 * (Math.min(i + 1, d.frames - 1) * n + j);
+  function localRotation(j, a, b, f) {
+    const o = 4 * j;
     let same = 0;
-    for (let k = 0; k < 4; k++) same += d.local[a + k] * d.local[b + k];
+    for (let k = 0; k < 4; k++) same += a.local[o + k] * b.local[o + k];
     const sign = same < 0 ? -1 : 1;
-    for (let k = 0; k < 4; k++) local[k] = mix(d.local[a + k], sign * d.local[b + k], f);
+    for (let k = 0; k < 4; k++) local[k] = mix(a.local[o + k], sign * b.local[o + k], f);
     const norm = Math.hypot(local[0], local[1], local[2], local[3]) || 1;
     for (let k = 0; k < 4; k++) local[k] /= norm;
   }
@@ -48,23 +45,19 @@ function createPose(d) {
     rows.forEach((row, r) => pose.skin.set([...row, pose.position[j][r] - dot(row, d.rest[j])], 12 * j + 4 * r));
   }
 
-  pose.update = (time) => {
-    if (!d.frames) return pose;
-    const exact = clamp(time * d.fps, 0, d.frames - 1);
-    const i = Math.floor(exact + 1e-6), f = Math.max(0, exact - i);
-    pose.frame = i;
+  // A moment between two frames {root [x, z], hips, local (four numbers a joint, of any scale), gaze, user or null}.
+  pose.set = (a, b, f) => {
     d.joints.forEach((joint, j) => {
-      localRotation(j, i, f);
+      localRotation(j, a, b, f);
       compose(j, joint.parent);
       pose.position[j] = joint.parent === null
-        ? [0, 1, 2].map((k) => between(d.hips, i, k, f, 3))
+        ? lerp(a.hips, b.hips, f)
         : add(pose.position[joint.parent], rotate(pose.rotation, joint.offset, 4 * joint.parent));
       skin(j);
     });
-    pose.root = [between(d.root, i, 0, f, 3), 0, between(d.root, i, 1, f, 3)];
-    const here = [...d.user.subarray(3 * i, 3 * i + 3)], next = d.user.subarray(3 * Math.min(i + 1, d.frames - 1));
-    pose.user = Number.isNaN(here[0]) ? null : Number.isNaN(next[0]) ? here : lerp(here, next, f);
-    pose.gaze = d.gaze[i];
+    pose.root = [mix(a.root[0], b.root[0], f), 0, mix(a.root[1], b.root[1], f)];
+    pose.user = a.user && b.user ? lerp(a.user, b.user, f) : a.user;
+    pose.gaze = a.gaze;
     const head = d.index.get("head");
     if (head !== undefined) {
       pose.eyes = add(pose.position[head], rotate(pose.rotation, d.eyes, 4 * head));
@@ -75,8 +68,5 @@ function createPose(d) {
 
   // A point of the rest pose, carried by joint j.
   pose.carry = (j, p) => add(pose.position[j], rotate(pose.rotation, sub(p, d.rest[j]), 4 * j));
-  // Decoded joint positions of the shown frame, before the rig's bone lengths were imposed.
-  pose.decoded = () => d.joints.map((_, j) => [0, 1, 2].map((k) =>
-    d.decoded[3 * (pose.frame * n + j) + k] * d.step + (k === 0 ? d.root[3 * pose.frame] : k === 2 ? d.root[3 * pose.frame + 1] : 0)));
   return pose;
 }

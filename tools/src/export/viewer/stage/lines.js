@@ -1,32 +1,17 @@
 // Lines as thin triangles, for both renderers: {points: [from, to], width (m), colour: [r, g, b, a] at both ends}.
 
-// The user's way on the floor as pieces between known positions, thinned to 15 a second.
-function trailPieces(d) {
-  const pieces = [];
-  const known = (i) => !Number.isNaN(d.user[3 * i]);
-  const at = (i) => [d.user[3 * i], 0.004, d.user[3 * i + 2]];
-  for (let i = 0; i + 2 < d.frames; i += 2) {
-    if (known(i) && known(i + 1) && known(i + 2)) pieces.push({ from: at(i), to: at(i + 2), frame: i });
-  }
-  return pieces;
-}
-
 // Everything drawn as lines in one moment.
-function sceneLines(d, pose, pieces, options) {
+// Options: trail (lines of the user's way), colour (the user's mark), joints (decoded positions), gazeLine.
+function sceneLines(d, pose, options) {
   const out = [];
   const line = (from, to, width, c0, c1 = c0, flat = false) => out.push({ from, to, width, c0, c1, flat });
-  for (const piece of pieces) {
-    const past = piece.frame <= pose.frame;
-    const alpha = past ? mix(0.28, 0.95, smoothstep(8 * d.fps, 0, pose.frame - piece.frame)) : 0.10;
-    const colour = [...timeColour(piece.frame / d.frames), alpha];
-    line(piece.from, piece.to, past ? 0.034 : 0.02, colour, colour, true);
-  }
+  out.push(...(options.trail ?? []));
   if (pose.user && !options.fromUser) {
-    const foot = [pose.user[0], 0.006, pose.user[2]], c = timeColour(pose.frame / d.frames);
+    const foot = [pose.user[0], 0.006, pose.user[2]], c = options.colour ?? timeColour(0.5);
     ring(foot, 0.13, [...c, 0.9]);
     line(foot, add(pose.user, [0, -0.14, 0]), 0.006, [...c, 0.75], [...c, 0.15]);
   }
-  if (pose.eyes) {
+  if (pose.eyes && options.gazeLine !== false) {
     const c = gazeColour(Number.isNaN(pose.gaze) ? 0 : pose.gaze);
     const start = add(pose.eyes, scale(pose.facing, 0.03));
     const far = options.fromUser ? 0.35 : pose.user ? Math.min(2.2, length(sub(pose.user, pose.eyes))) : 1.2;
@@ -34,7 +19,7 @@ function sceneLines(d, pose, pieces, options) {
     if (pose.user && !options.fromUser) dashes(pose.eyes, add(pose.user, scale(unit(sub(pose.eyes, pose.user)), 0.13)), c);
   }
   if (options.joints) {
-    const decoded = pose.decoded(), c = [1, 0.85, 0.3];
+    const decoded = options.joints, c = [1, 0.85, 0.3];
     decoded.forEach((p, j) => {
       const parent = d.joints[j].parent;
       line(add(p, [0, -0.009, 0]), add(p, [0, 0.009, 0]), 0.018, [...c, 0.95]);

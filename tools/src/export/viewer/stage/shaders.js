@@ -41,12 +41,13 @@ layout(location = 0) in vec3 aPosition;
 layout(location = 1) in vec3 aNormal;
 layout(location = 2) in vec4 aBones;
 layout(location = 3) in vec4 aWeights;
-layout(location = 4) in vec2 aLook;
+layout(location = 4) in vec4 aLook;
 uniform vec4 uBones[${3 * bones}];
 uniform mat4 uView;
 out vec3 vWorld, vNormal, vRest;
 flat out float vTint;
 out float vOcclusion;
+out vec2 vLook;
 void main() {
   vec4 r0 = vec4(0.0), r1 = vec4(0.0), r2 = vec4(0.0);
   for (int i = 0; i < 4; i++) {
@@ -61,6 +62,7 @@ void main() {
   vRest = aPosition;
   vTint = aLook.x * 255.0;
   vOcclusion = aLook.y;
+  vLook = 2.0 * aLook.zw - 1.0;
   gl_Position = uView * vec4(vWorld, 1.0);
 }`;
 
@@ -68,8 +70,9 @@ const BODY_FRAGMENT = `${COMMON}
 in vec3 vWorld, vNormal, vRest;
 flat in float vTint;
 in float vOcclusion;
+in vec2 vLook;
 uniform vec3 uEye;
-uniform vec3 uTints[7];
+uniform vec3 uTints[9];
 uniform vec3 uClothes[3];
 uniform vec4 uCloth;
 uniform float uAlpha;
@@ -83,9 +86,16 @@ vec3 dressed() {
   float hem = min(min(abs(vRest.y - uCloth.y), abs(abs(vRest.x) - uCloth.w)), abs(vRest.y - uCloth.x));
   return mix(c, uTints[1], skin) * mix(0.82, 1.0, smoothstep(0.0, 0.007, hem));
 }
+// White, iris with a dark rim, pupil.
+vec3 eyeball() {
+  float r = length(vLook), w = max(fwidth(r), 0.01);
+  vec3 iris = uTints[7] * mix(1.25, 0.45, smoothstep(0.30, 0.47, r));
+  vec3 c = mix(iris, uTints[3], smoothstep(-w, w, r - 0.47));
+  return mix(vec3(0.004), c, smoothstep(-w, w, r - 0.2));
+}
 void main() {
   int tint = int(vTint + 0.5);
-  vec3 base = tint == 0 ? dressed() : uTints[tint];
+  vec3 base = tint == 0 ? dressed() : tint == 3 ? eyeball() : uTints[tint];
   vec3 n = normalize(vNormal), v = normalize(uEye - vWorld);
   if (dot(n, v) < 0.0) n = normalize(n - 1.02 * dot(n, v) * v);
   float lit = keyLight(vWorld + 0.004 * n, 0.07);
@@ -120,6 +130,9 @@ uniform vec3 uCentre;
 uniform vec3 uFloor;
 uniform vec4 uGrid;
 uniform float uDark;
+uniform vec3 uRug;
+// With a backdrop (1) or a bare grid (0), see-through (1: shadows alone), where the rug lies.
+uniform vec4 uScene;
 out vec4 colour;
 float lines(float period, float width) {
   vec2 g = abs(fract(vWorld.xz / period + 0.5) - 0.5) * period;
@@ -147,7 +160,13 @@ void main() {
   float grid = max(lines(1.0, 0.0055), 0.35 * lines(0.25, 0.0025) * near);
   vec4 ground = vec4(uFloor, 1.0) * (0.9 * fade);
   vec4 mark = vec4(uGrid.rgb, 1.0) * (uGrid.a * grid * fade);
+  float away = length(vWorld.xz - uScene.zw), soft = fwidth(away) + 0.004;
+  float rug = uScene.x * (1.0 - smoothstep(1.9, 1.9 + soft, away));
+  float edge = rug * (1.0 - smoothstep(0.012, 0.012 + soft, abs(away - 1.82)));
+  mark *= 1.0 - 0.85 * rug;
+  ground = mix(ground, vec4(uRug * mix(1.0, 0.86, edge), 1.0), rug);
   ground = mark + ground * (1.0 - mark.a);
+  ground *= 1.0 - uScene.y;
   float dark = shadow * uDark * fade;
   colour = vec4(ground.rgb * (1.0 - dark), max(ground.a, dark));
 }`;
@@ -168,3 +187,31 @@ precision mediump float;
 in vec4 vColour;
 out vec4 colour;
 void main() { colour = vec4(vColour.rgb * vColour.a, vColour.a); }`;
+
+const SKY_VERTEX = `#version 300 es
+precision highp float;
+layout(location = 0) in vec2 aCorner;
+uniform mat4 uView;
+uniform vec3 uEye;
+out vec3 vWay;
+void main() {
+  float s = gl_InstanceID < 3 ? 1.0 : -1.0;
+  int axis = gl_InstanceID % 3;
+  vWay = axis == 0 ? vec3(s, aCorner) : axis == 1 ? vec3(aCorner.y, s, aCorner.x) : vec3(aCorner, s);
+  gl_Position = uView * vec4(uEye + 20.0 * vWay, 1.0);
+}`;
+
+// From the floor's colour at the horizon to the zenith's; noise of half a step hides bands.
+const SKY_FRAGMENT = `#version 300 es
+precision highp float;
+in vec3 vWay;
+uniform vec3 uSky[2];
+uniform vec3 uFloor;
+out vec4 colour;
+void main() {
+  float up = normalize(vWay).y;
+  vec3 c = mix(uSky[0], uSky[1], pow(clamp(up, 0.0, 1.0), 0.6));
+  c = mix(c, uFloor, smoothstep(0.02, -0.12, up));
+  c += (fract(sin(dot(gl_FragCoord.xy, vec2(12.9898, 78.233))) * 43758.5453) - 0.5) / 255.0;
+  colour = vec4(c, 1.0);
+}`;

@@ -112,7 +112,8 @@ function createCanvas2d(canvas, d, shapes) {
   return {
     name: "canvas2d",
     draw(scene) {
-      const look = LOOKS[scene.theme];
+      const look = LOOKS[scene.theme], view = scene.views[0];
+      scene = { ...scene, view };
       g.clearRect(0, 0, canvas.width, canvas.height);
       floor(scene, look);
       shadows(scene, look);

@@ -1,0 +1,92 @@
+// Standing in front of the agent: WebXR, immersive VR and AR.
+//
+// The headset's floor is laid into the agent's world so that the user stands 1.5 m in front of the agent, where the agent faces at that
+// moment, looking at it: anew for each session, and whenever the headset is recentred. A fixed place would bring who has walked around
+// before, or changes from VR to AR, in behind the agent's back, which then takes two seconds to turn.
+import { multiply } from "./stage.js";
+
+const AWAY = 1.5;
+
+export function createXr(gl, { agentRoot, frame, onHead, onGaze, onInterrupt, onChange }) {
+  const xr = { mode: null, offers: { vr: false, ar: false } };
+  let session = null, floor = null, space = null, placed = false;
+
+  xr.look = async () => {
+    const can = (mode) => navigator.xr?.isSessionSupported(mode).catch(() => false) ?? false;
+    [xr.offers.vr, xr.offers.ar] = await Promise.all([can("immersive-vr"), can("immersive-ar")]);
+    return xr.offers;
+  };
+
+  // "vr", "ar", or null to leave. From one to the other the first ends before the second begins.
+  xr.enter = async (mode) => {
+    if (session) await session.end();
+    if (!mode) return;
+    // Asked for first: a browser grants it only in a gesture of the user.
+    const next = await navigator.xr.requestSession(mode === "vr" ? "immersive-vr" : "immersive-ar", { requiredFeatures: ["local-floor"] });
+    session = next;
+    session.addEventListener("end", ended);
+    session.addEventListener("select", onInterrupt);
+    session.addEventListener("squeeze", () => onGaze(null));
+    await gl.makeXRCompatible();
+    session.updateRenderState({ baseLayer: new XRWebGLLayer(session, gl), depthNear: 0.05, depthFar: 80 });
+    floor = await session.requestReferenceSpace("local-floor");
+    floor.addEventListener?.("reset", () => { placed = false; });
+    [space, placed] = [floor, false];
+    xr.mode = mode;
+    onChange();
+    session.requestAnimationFrame(draw);
+  };
+
+  function ended() {
+    session = null;
+    xr.mode = null;
+    onChange();
+  }
+
+  // The user's place on the headset's floor becomes the place before the agent, its looking ahead the way to the agent.
+  function lay(pose) {
+    const { x, z, yaw } = agentRoot();
+    const { position: p, orientation: q } = pose.transform;
+    const heading = Math.atan2(-2 * (q.x * q.z + q.w * q.y), -(1 - 2 * (q.x * q.x + q.y * q.y)));
+    // Turned by `turn` about the vertical, `heading` becomes the agent's yaw and half a turn.
+    const turn = yaw + Math.PI - heading, [s, c] = [Math.sin(turn), Math.cos(turn)];
+    const [wx, wz] = [x + AWAY * Math.sin(yaw), z + AWAY * Math.cos(yaw)];
+    const [ox, oz] = [wx - (c * p.x + s * p.z), wz - (c * p.z - s * p.x)];
+    // An offset space is given by where its origin lies in the old one: the inverse.
+    const origin = { x: -(c * ox - s * oz), y: 0, z: -(s * ox + c * oz) };
+    space = floor.getOffsetReferenceSpace(new XRRigidTransform(origin, { x: 0, y: Math.sin(-turn / 2), z: 0, w: Math.cos(-turn / 2) }));
+    placed = true;
+  }
+
+  function draw(time, xrFrame) {
+    if (xrFrame.session !== session) return;
+    session.requestAnimationFrame(draw);
+    if (!placed) {
+      const first = xrFrame.getViewerPose(floor);
+      if (!first) return;
+      lay(first);
+    }
+    const pose = xrFrame.getViewerPose(space);
+    if (!pose) return;
+    const head = pose.transform.position, layer = session.renderState.baseLayer;
+    onHead([head.x, head.y, head.z]);
+    sticks();
+    const views = pose.views.map((view) => {
+      const { position } = view.transform, camera = view.transform.inverse.matrix;
+      return {
+        eye: [position.x, position.y, position.z], viewport: layer.getViewport(view),
+        projection: view.projectionMatrix, camera, matrix: multiply(view.projectionMatrix, camera),
+      };
+    });
+    frame(time, views, layer.framebuffer, session.environmentBlendMode !== "opaque" || xr.mode === "ar");
+  }
+
+  // A stick pushed up or down raises or lowers the gaze target.
+  function sticks() {
+    for (const { gamepad } of session.inputSources) {
+      const push = gamepad?.axes?.[3] ?? 0;
+      if (Math.abs(push) > 0.25) onGaze(-push * 0.008);
+    }
+  }
+  return xr;
+}
