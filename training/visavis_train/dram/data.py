@@ -5,6 +5,7 @@
 Writes OUT/{train,val,test}/*.npy. Conversations of a corpus without the user's head rotations get them as `corpus/partner.py` derives them.
 """
 import argparse
+import functools
 import json
 import os
 
@@ -81,11 +82,16 @@ class Split:
             self.names = json.load(f)
         self.talk = torch.tensor([n.startswith("talk") for n in self.names])
 
+    @functools.cached_property
+    def moments(self):
+        """Mean, deviation and deviation of steps of y."""
+        y = self.y[::7]
+        at = torch.cat([torch.arange(a + 1, b, 7) for a, b in zip(self.starts[:-1].tolist(), self.starts[1:].tolist())])
+        return y.mean(0), y.std(0), (self.y[at] - self.y[at - 1]).square().mean(0).sqrt()
+
     def statistics(self, layout):
         """Mean and deviation of y, and the deviation of its steps in units of it; the numbers of a joint share theirs."""
-        y = self.y[::7]
-        mean, std = y.mean(0), y.std(0)
-        step = torch.cat([self.y[a + 1:b] - self.y[a:b - 1] for a, b in zip(self.starts[:-1].tolist(), self.starts[1:].tolist())])[::7].square().mean(0).sqrt()
+        mean, std, step = self.moments
         share = lambda v, least: torch.cat([v[:pose.LEAD], v[pose.LEAD:].unflatten(0, (-1, 6)).square().mean(-1).sqrt().clamp(min=least).repeat_interleave(6)])
         std, step = share(std, 0.02), share(step, 2e-4)
         return tuple(layout.take(v) for v in (mean, std, step / std))

@@ -47,6 +47,7 @@ def forced(net, window, layout, first, last, noisy=None):
     return net(p[:, first - 1:last - 1], before, window.heard(first, last), net.state(len(p)))
 
 
+@torch.no_grad()
 def free(net, window, layout, first, last, warm=5):
     """Recorded poses up to frame first - 1 (the state is warmed from frame `warm` on), then its own: y [B, last - first, D], Delta, roots."""
     p = standardise(net, layout.take(window.y))

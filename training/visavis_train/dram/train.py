@@ -13,6 +13,7 @@ import os
 import torch
 
 from ..train import common
+from ..train.common import mixed
 from ..train.loop import Loop
 from ..train.team import Team
 from . import nets, pose, roll
@@ -55,6 +56,7 @@ def losses(net, window, layout, own, most=0.5):
     off = noise(clean, net.step, most)
     history = clean + off
     out, _, state = roll.forced(net, window, layout, WARM, FIRST, history)
+    out, state = out.float(), [[h.float() for h in part] for part in state]
     wanted = clean[:, WARM:FIRST] + (0 if net.absolute else KEPT * off[:, WARM - 1:FIRST - 1])
     near = ((out - wanted) / net.step)[:, 16:].clamp(-30, 30).square().mean()
     if not own or net.absolute:
@@ -68,10 +70,9 @@ def losses(net, window, layout, own, most=0.5):
     return near, far / own
 
 
-def train(args, out):
-    team = Team(1)
+def train(args, out, data, held):
+    team, layout = Team(1), LAYOUTS[args.layout]
     torch.manual_seed(args.seed)
-    data, held, layout = Split(args.data, "train"), Split(args.data, "val"), LAYOUTS[args.layout]
     net, sizes = build(args, data.agent.shape[1], data, layout)
     if args.init:
         net.load_state_dict(common.load(args.init)["ema"])
@@ -89,7 +90,8 @@ def train(args, out):
     for _ in loop:
         own = int(args.own * min(1.0, loop.progress / 0.6)) if loop.progress > 0.1 else 0
         window = data.sample(args.batch, FIRST + own + 1)
-        near, far = losses(net, window, layout, own)
+        with mixed(args.device):
+            near, far = losses(net, window, layout, own)
         loop.update(near + args.own_weight * far, train=near, own=far)
         loop.report(50, measure, 200)
     loop.finish(measure)
@@ -118,8 +120,9 @@ def main():
     common.arguments(parser, steps=3000, lr=2e-3, batch=24)
     args = parser.parse_args()
     common.start_process(args)
+    data, held = Split(args.data, "train"), Split(args.data, "val")
     if not args.table:
-        return train(args, args.out)
+        return train(args, args.out, data, held)
     os.makedirs(args.out, exist_ok=True)
     folder, args.layout = args.out, "upper"
     for args.variant in reversed(nets.VARIANTS):
@@ -127,7 +130,7 @@ def main():
             out = os.path.join(folder, f"{args.variant}-{args.backbone}.pt")
             if not os.path.exists(out + ".done"):
                 print(out, flush=True)
-                train(args, out)
+                train(args, out, data, held)
                 open(out + ".done", "w").close()
 
 
