@@ -7,7 +7,7 @@ from multiprocessing import get_context
 import numpy as np
 
 from ..motion import bvh
-from . import converse, gestures, plausible, real, rest, simulate, store, voices
+from . import converse, gestures, partner, plausible, real, rest, simulate, store, voices
 
 SPLITS = ("train", "val", "test")
 RETRIES = 8
@@ -64,9 +64,13 @@ def _write_talk(job):
     silent = i % 8 == 3
     person = (0.5 + (i // 8 if silent else i) * 0.7548776662) % 1.0
     clip, rejected = talk((seed, s, 2, i), frames, _sources, (0.35 + i * 0.6180339887) % 1.0, person, silent)
-    store.save(os.path.join(folder, f"talk_{i:05d}.safetensors"), clip.positions, clip.rotations, clip.user, clip.agent_voice, clip.user_voice,
-               {"split": SPLITS[s], "sources": clip.sources, "gaze_level": f"{clip.level.mean():.4f}", "seed": f"{seed}/{s}/{i}", "kind": "talk",
-                "agent_phrases": _seconds(clip.agent_phrases), "user_phrases": _seconds(clip.user_phrases), "joins": clip.joins})
+    place = f"{seed}/{s}/{i}"
+    seen, positions, rotations, nods = partner.perform(partner.seeded(place), clip.positions, clip.rotations, clip.user, clip.agent_phrases,
+                                                       clip.user_phrases)
+    store.save(os.path.join(folder, f"talk_{i:05d}.safetensors"), positions, rotations, clip.user, clip.agent_voice, clip.user_voice,
+               {"split": SPLITS[s], "sources": clip.sources, "gaze_level": f"{clip.level.mean():.4f}", "seed": place, "kind": "talk",
+                "agent_phrases": _seconds(clip.agent_phrases), "user_phrases": _seconds(clip.user_phrases), "joins": clip.joins,
+                "user_nods": nods}, seen)
     return rejected
 
 
@@ -77,9 +81,9 @@ def _seconds(phrases):
 def _real_clips(data, folder, split, seed, s):
     """Writes the two-person takes, the chained walks and the people at rest; returns the reasons of what was left out."""
     left_out = []
-    for name, p, r, u in real.two_person(data, split):
+    for name, p, r, u, seen in real.two_person(data, split):
         meta = {"split": split, "sources": ["cmu_two_person/" + name], "gaze_level": "nan", "seed": str(seed), "kind": "pair"}
-        left_out += _keep(os.path.join(folder, f"pair_{name}.safetensors"), p, r, u, meta)
+        left_out += _keep(os.path.join(folder, f"pair_{name}.safetensors"), p, r, u, meta, seen)
     for name, p, r, u, parts in real.walks(data, split, np.random.default_rng([seed, s, 1])):
         meta = {"split": split, "sources": parts, "gaze_level": "nan", "seed": str(seed), "kind": "walk"}
         left_out += _keep(os.path.join(folder, f"walk_{name}.safetensors"), p, r, u, meta)
@@ -89,10 +93,10 @@ def _real_clips(data, folder, split, seed, s):
     return left_out
 
 
-def _keep(path, p, r, u, meta):
+def _keep(path, p, r, u, meta, seen=None):
     reasons = plausible.faults(p, r, plausible.CAPTURED)
     if not reasons:
-        store.save(path, p, r, u, None, None, meta)
+        store.save(path, p, r, u, None, None, meta, seen)
     return reasons
 
 

@@ -46,7 +46,7 @@ def _pieces(bad, least):
 
 
 def two_person(data, split, least=6.0):
-    """Yields (name, positions, rotations, other head) of good stretches, both roles, mirrored too."""
+    """Yields (name, positions, rotations, other head, its rotations) of good stretches, both roles, mirrored too."""
     folder = os.path.join(data, "motion", "cmu_two_person")
     for nn in TWO_PERSON[split]:
         takes = [load_take(os.path.join(folder, f"{s}_{nn}.bvh"), f"{s}_{nn}") for s in ("60", "61")]
@@ -60,15 +60,16 @@ def two_person(data, split, least=6.0):
         for a, b in _pieces(bad, int(least * FPS)):
             for k in (0, 1):
                 p, r = lock_feet(takes[k].positions[a:b], takes[k].rotations[a:b])
-                u = heads[1 - k][a:b]
-                yield f"{takes[k].name}_{a}", p, r, u
+                u, seen = heads[1 - k][a:b], takes[1 - k].rotations[a:b, rig.INDEX["head"]]
+                yield f"{takes[k].name}_{a}", p, r, u, seen
                 mp, mr = rig.mirror(p, r)
-                yield f"{takes[k].name}_{a}_mirror", mp, mr, u * [-1, 1, 1]
+                side = np.array([-1.0, 1.0, 1.0])
+                yield f"{takes[k].name}_{a}_mirror", mp, mr, u * side, seen * side[:, None] * side
 
 
 def head_paths(data, split):
     """Head paths [n, 3] of the real pairs, for simulated users of the same split."""
-    return [u for name, _, _, u in two_person(data, split, 4.0)]
+    return [u for _, _, _, u, _ in two_person(data, split, 4.0)]
 
 
 # Walks, turns, side steps and stops of one actress: train only

@@ -3,6 +3,7 @@
     positions   f32 [T, 22, 3]   global joint positions, metres, Y up, the agent's root at the origin facing +Z in frame 0
     rotations   f32 [T, 22, 4]   global quaternions (x, y, z, w), sign-continuous
     user_head   f32 [T, 3]       the user's head position
+    user_head_rotation f32 [T, 4]  global quaternions of the user's head, the identity facing +Z; left out where unknown
     agent_voice i16 [800 T]      24 kHz mono; left out where absent
     user_voice  i16 [800 T]      likewise
 metadata (strings): split, sources (JSON list), gaze_level, seed, kind, fps.
@@ -29,6 +30,7 @@ class Clip:
     agent_voice: np.ndarray = None
     user_voice: np.ndarray = None
     meta: dict = field(default_factory=dict)
+    user_head_rotation: np.ndarray = None
 
 
 def to_session(positions, rotmats, user):
@@ -42,17 +44,25 @@ def _pcm(voice):
     return np.clip(np.round(voice * 32767), -32768, 32767).astype(np.int16)
 
 
-def save(path, positions, rotmats, user, agent_voice, user_voice, meta):
-    """Writes one clip; voices are float [800 T] or None."""
+def save(path, positions, rotmats, user, agent_voice, user_voice, meta, user_rotmats=None):
+    """Writes one clip; voices are float [800 T] or None; `user_rotmats` [T, 3, 3] or None: the user's head."""
     p, r, u = to_session(positions, rotmats, user)
-    q = rig.continuous_quats(rig.mat_to_quat(r))
-    data = {"positions": p.astype(np.float32), "rotations": q.astype(np.float32), "user_head": u.astype(np.float32)}
+    quats = lambda m: rig.continuous_quats(rig.mat_to_quat(m)).astype(np.float32)
+    data = {"positions": p.astype(np.float32), "rotations": quats(r), "user_head": u.astype(np.float32)}
+    if user_rotmats is not None:
+        data["user_head_rotation"] = quats(rig.axis_mat("y", -rig.yaw_of(rotmats[0, 0])) @ user_rotmats)
     for key, voice in (("agent_voice", agent_voice), ("user_voice", user_voice)):
         if voice is not None:
             data[key] = _pcm(voice)
     meta = {k: v if isinstance(v, str) else json.dumps(v) for k, v in meta.items()}
     meta.setdefault("fps", str(rig.FPS))
     _write(path, data, meta)
+
+
+def rewrite(path, clip):
+    """Writes a clip that was loaded, as it is."""
+    names = ("positions", "rotations", "user_head", "user_head_rotation", "agent_voice", "user_voice")
+    _write(path, {k: v for k in names if (v := getattr(clip, k)) is not None}, clip.meta)
 
 
 def _write(path, tensors, meta):
@@ -79,9 +89,9 @@ def load(path, voices=True):
         if missing:
             raise ClipError(f"{path}: tensors {sorted(missing)} are missing; see visavis_train/corpus/store.py for the format")
         get = lambda k: f.get_tensor(k) if k in keys else None
-        clip = Clip(*(get(k) for k in ("positions", "rotations", "user_head", "agent_voice", "user_voice")), meta)
+        clip = Clip(*(get(k) for k in ("positions", "rotations", "user_head", "agent_voice", "user_voice")), meta, get("user_head_rotation"))
     t = len(clip.positions)
-    want = {"positions": (t, rig.J, 3), "rotations": (t, rig.J, 4), "user_head": (t, 3)}
+    want = {"positions": (t, rig.J, 3), "rotations": (t, rig.J, 4), "user_head": (t, 3)} | ({"user_head_rotation": (t, 4)} if clip.user_head_rotation is not None else {})
     for k, shape in want.items():
         if getattr(clip, k).shape != shape:
             raise ClipError(f"{path}: {k} is {list(getattr(clip, k).shape)}, expected {list(shape)}")

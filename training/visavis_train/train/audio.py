@@ -22,7 +22,7 @@ from ..nets.audio import FRAME_SAMPLES, AudioEncoder
 from . import common
 from .common import mixed
 from .loop import Loop
-from .sizes import SIZES
+from .sizes import SIZES, convolutions
 from .team import Team
 
 RATE = 24000
@@ -161,6 +161,8 @@ def main():
     parser.add_argument("--validate", default="", help="the same for validation")
     parser.add_argument("--out", required=True)
     parser.add_argument("--size", choices=SIZES, default="base")
+    parser.add_argument("--channels", type=int, nargs="+", help="channels after each convolution instead of the size's, at least five")
+    parser.add_argument("--features", type=int, help="width of the features instead of the size's")
     parser.add_argument("--frames", type=int, default=60)
     parser.add_argument("--distil", metavar="FOLDER", help="features of a larger model as further targets (see above)")
     parser.add_argument("--distil-rate", type=float, default=50.0)
@@ -169,6 +171,11 @@ def main():
     common.arguments(parser, steps=2000, lr=2e-3, batch=24)
     args = parser.parse_args()
     device, team = common.start_process(args), Team(args.workers)
+    size = dict(SIZES[args.size]["audio"])
+    if args.channels:
+        size["layers"] = convolutions(*args.channels)
+    if args.features:
+        size["features"] = args.features
     every = sorted(glob.glob(os.path.join(args.speech, "**", "*.wav"), recursive=True))
 
     def pick(starts):
@@ -185,7 +192,7 @@ def main():
     check = held.batch(64)[0]
     check_targets = targets(check)
     first = common.load(args.out if args.resume else args.init) if args.resume or args.init else None
-    net = (AudioEncoder(first["spec"], first["features"]) if first else AudioEncoder(**SIZES[args.size]["audio"])).to(device)
+    net = (AudioEncoder(first["spec"], first["features"]) if first else AudioEncoder(**size)).to(device)
     if first:
         net.load_state_dict(first["net"])
     width = net.out.out_features
