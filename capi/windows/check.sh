@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The Windows library and command under Debian's Wine, minutes: capi/windows/check.sh
 #
-# Promises of engine, session, pool and files; the C example; the demo's motion, in bytes those of this system. Skipped, in words, where
+# Promises of sessions, inputs, files and paths; the C example; the demo's motion, in bytes those of this system. Skipped, in words, where
 # Wine or mingw cannot be had. Wine is not Windows: docs/platforms.md says what it does not show.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
