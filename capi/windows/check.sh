@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The Windows library and command under Debian's Wine, minutes: capi/windows/check.sh
 #
-# Promises of engine, session, pool and files; the C example; the demo's motion, in bytes those of this system. Skipped, in words, where
+# Promises of sessions, inputs, files and paths; the C example; the demo's motion, in bytes those of this system. Skipped, in words, where
 # Wine or mingw cannot be had. Wine is not Windows: docs/platforms.md says what it does not show.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
@@ -43,10 +43,8 @@ for name in motion.bvh motion.glb motion.vrma; do
 done
 (cd "$out/here" && sha256sum motion.*)
 
-echo '-- tests: engine, session, pool, inputs, files'
+echo '-- tests: sessions on one and two threads, inputs of other threads, files, paths'
 tests() { cargo test --quiet --release "${std[@]}" "$@"; }
-tests -p visavis --lib -- par:: bundle:: queue:: bounded:: engine:: session::
-tests -p visavis --test session --test inputs --test bad_input
-tests -p visavis-tools --lib -- export:: offline::
+tests -p visavis --test session --test inputs
 tests -p visavis-tools --test windows
-tests -p visavis-capi --test paths --test threads
+tests -p visavis-capi --test paths

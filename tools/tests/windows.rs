@@ -7,10 +7,9 @@ mod cli;
 #[path = "../../tests/common/mod.rs"]
 mod common;
 
-use cli::{Scratch, fails, names, succeeds, tone};
+use cli::{Scratch, names, succeeds, tone, visavis};
 use common::golden_path;
 use std::fs::{File, OpenOptions};
-use std::io::Write;
 use std::os::windows::fs::OpenOptionsExt;
 use std::path::Path;
 use visavis::internals::kernels::Kernels;
@@ -129,7 +128,9 @@ fn results_stay_together_when_one_is_held() {
     let before = read();
     for name in ["index.html", "motion.glb", "metrics.json"] {
         let held = hold(&out.join(name));
-        let message = fails(1, &run("2"));
+        let output = visavis(&run("2"));
+        assert_eq!(output.status.code(), Some(1));
+        let message = String::from_utf8(output.stderr).expect("UTF-8");
         assert!(message.contains(name) && message.contains(ADVICE), "{message}");
         drop(held);
         assert!(read() == before, "{name} was held");
