@@ -25,7 +25,7 @@ export class Session {
 
   constructor(link, facts, id, { clock = "real", ...options }) {
     if (clock !== "real" && clock !== "manual") throw argument(`clock ${JSON.stringify(clock)}: "real" or "manual"`);
-    if (options.gaze !== undefined && options.gaze !== null) number("gaze", options.gaze);
+    checked(options);
     this.#link = link;
     this.#joints = facts.joints.length;
     this.#id = id;
@@ -154,6 +154,18 @@ export class Session {
     this.onError?.(error);
   }
 }
+
+/** What JSON would turn into null, or cannot hold, is told here; ranges are the module's business. */
+function checked(options) {
+  for (const [name, value] of Object.entries(options)) {
+    const values = Array.isArray(value) ? value : [value];
+    values.forEach((v) => typeof v === "number" && number(name, v));
+    typed(`option ${name}`, "a number, a string, a boolean, null, or numbers", values.every(plain));
+  }
+  if (typeof options.gaze === "string") throw argument(`gaze ${JSON.stringify(options.gaze)}: a number or null`);
+}
+
+const plain = (value) => value === null || ["number", "string", "boolean", "undefined"].includes(typeof value);
 
 function which(who) {
   if (!Object.hasOwn(VOICES, who)) throw argument(`voice ${JSON.stringify(who)}: "agent" or "user"`);
