@@ -56,6 +56,15 @@ export function createVoice(agent, openContext) {
     return u?.source ? agent.shown() - u.start - (context.currentTime - u.at) + (context.outputLatency || context.baseLatency || 0) : null;
   };
 
+  // Where sound and picture came apart (a device that slept, a clock that jumped) the rest is played anew, in step.
+  voice.keep = (context) => {
+    const off = context?.state === "running" ? voice.behind(context) : null;
+    if (off === null || Math.abs(off) < 0.08) return;
+    const u = heard();
+    u.source.stop();
+    play(u, context);
+  };
+
   // Loudness now, 0 to 1 of speech's usual loud parts: mean square of 40 ms.
   voice.level = () => {
     const u = heard();
