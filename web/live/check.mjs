@@ -129,9 +129,9 @@ const checks = {
     const enter = (mode) => page.click(`#${mode}`).then(() => until(page, `entered ${mode}`, (d) => d.mode === mode && /,1\.600,/.test(d.user), 30));
     const walk = async (mode) => {
       let d = await enter(mode);
-      const [x, , z] = d.user.split(",").map(Number), [rx, rz] = d.root.split(",").map(Number), far = Math.hypot(x - rx, z - rz);
-      claim(far > 1.2 && far < 1.9, `${mode}: the user stands ${far.toFixed(2)} m away, not 1.5`);
-      claim(off(d) < 40, `${mode}: on entering, the agent faces ${off(d).toFixed(0)} degrees off`);
+      const { user: [x, , z], agent } = await page.evaluate(() => window.visavisLive.xr.first), far = Math.hypot(x - agent.x, z - agent.z);
+      const ahead = off({ bearing: Math.atan2(x - agent.x, z - agent.z), yaw: agent.yaw });
+      claim(far > 1.4 && far < 1.6 && ahead < 8, `${mode}: the user stands ${far.toFixed(2)} m away, not 1.5, ${ahead.toFixed(0)} degrees beside where the agent faces`);
       // A quarter circle round the agent, in the headset's coordinates 1.5 m ahead, in five seconds.
       await page.evaluate(async () => {
         const { x, y, z } = device.position, begun = performance.now();

@@ -32,9 +32,9 @@ export function createVoice(agent, openContext) {
     u.source.buffer = buffer;
     u.source.connect(gain);
     const wait = u.start - agent.shown() - (context.outputLatency || context.baseLatency || 0);
-    u.at = context.currentTime + Math.max(0, wait);
+    u.at = context.currentTime + wait;
     // What should have been heard already is left out, so that the rest is in step.
-    u.source.start(u.at, Math.max(0, -wait));
+    u.source.start(Math.max(context.currentTime, u.at), Math.max(0, -wait));
   }
 
   // Stops at once what is heard, and what the session has not used of it. Whether there was anything.
