@@ -185,7 +185,7 @@ async function start() {
   await offered();
 
   // The picture ------------------------------------------------------------------------------------------------------------
-  let before = performance.now(), ratio = Math.min(2, window.devicePixelRatio || 1), slow = 0, drawn = 0;
+  let before = performance.now(), ratio = Number(options.get("pixels")) || Math.min(2, window.devicePixelRatio || 1), slow = 0, drawn = 0;
   const tell = () => agent.session.pushUserHead(...user.position);
 
   // Where the frame time is over what 60 a second allow for two seconds, fewer pixels are drawn.
@@ -202,7 +202,6 @@ async function start() {
     if (canvas.width !== Math.round(w * ratio)) canvas.width = Math.round(w * ratio);
     if (canvas.height !== Math.round(h * ratio)) canvas.height = Math.round(h * ratio);
     user.update([root.x, 0, root.z], seconds);
-    tell();
     const covered = page.hasAttribute("data-clean") ? 0 : $("desk").offsetHeight / Math.max(1, h);
     draw(now, [user.view(pose, canvas.width, canvas.height, covered * 0.9, seconds)], null, false);
   }
@@ -224,13 +223,13 @@ async function start() {
       avatar.draw(views, framebuffer);
     }
     figures.frame(seconds, moment.late);
-    if (++drawn % 6 === 0) inform(moment);
+    drawn++;
   }
   const window_lines = () => [{ from: [user.position[0], 0.006, user.position[2]], to: add(user.position, [0, -0.14, 0]), width: 0.006, c0: [0.75, 0.47, 0.89, 0.8], c1: [0.75, 0.47, 0.89, 0.15], flat: false }];
 
   // In words for people, in data for scripts.
-  function inform(moment) {
-    const gaze = moment.from.gaze, saying = voice.saying(), speaking = voice.speaking(), data = page.dataset, p = user.position;
+  function inform() {
+    const moment = agent.at(), gaze = moment.from.gaze, saying = voice.saying(), speaking = voice.speaking(), data = page.dataset, p = user.position;
     const { calls, triangles } = renderer.counts();
     Object.assign(data, {
       frames: Math.round(agent.computed() * 30), drawn, speaking, mouth: face.open.toFixed(2), gaze: Number.isNaN(gaze) ? "" : gaze.toFixed(3), calls, triangles,
@@ -245,6 +244,9 @@ async function start() {
     if ($("says").textContent !== says) $("says").textContent = says;
   }
 
+  // At rates of their own, however long a picture takes; a headset tells its pose itself.
+  setInterval(() => user.inHeadset || tell(), 1000 / 60);
+  setInterval(() => { voice.keep(context); inform(); }, 100);
   setGaze(settings.gaze);
   if (options.has("outside")) acts.outside();
   for (const [name, k] of [["x", 0], ["z", 2]]) if (options.has(name)) user.position[k] = Number(options.get(name));

@@ -32,9 +32,9 @@ export function createVoice(agent, openContext) {
     u.source.buffer = buffer;
     u.source.connect(gain);
     const wait = u.start - agent.shown() - (context.outputLatency || context.baseLatency || 0);
-    u.at = context.currentTime + Math.max(0, wait);
+    u.at = context.currentTime + wait;
     // What should have been heard already is left out, so that the rest is in step.
-    u.source.start(u.at, Math.max(0, -wait));
+    u.source.start(Math.max(context.currentTime, u.at), Math.max(0, -wait));
   }
 
   // Stops at once what is heard, and what the session has not used of it. Whether there was anything.
@@ -54,6 +54,15 @@ export function createVoice(agent, openContext) {
   voice.behind = (context) => {
     const u = heard();
     return u?.source ? agent.shown() - u.start - (context.currentTime - u.at) + (context.outputLatency || context.baseLatency || 0) : null;
+  };
+
+  // Where sound and picture came apart (a device that slept, a clock that jumped) the rest is played anew, in step.
+  voice.keep = (context) => {
+    const off = context?.state === "running" ? voice.behind(context) : null;
+    if (off === null || Math.abs(off) < 0.08) return;
+    const u = heard();
+    u.source.stop();
+    play(u, context);
   };
 
   // Loudness now, 0 to 1 of speech's usual loud parts: mean square of 40 ms.

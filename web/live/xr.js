@@ -8,7 +8,8 @@ import { multiply } from "./stage.js";
 const AWAY = 1.5;
 
 export function createXr(gl, { agentRoot, frame, onHead, onGaze, onInterrupt, onChange }) {
-  const xr = { mode: null, offers: { vr: false, ar: false } };
+  // `first`: where both stood in the first picture after the user was placed.
+  const xr = { mode: null, first: null, offers: { vr: false, ar: false } };
   let session = null, floor = null, space = null, placed = false;
 
   xr.look = async () => {
@@ -56,6 +57,7 @@ export function createXr(gl, { agentRoot, frame, onHead, onGaze, onInterrupt, on
     const origin = { x: -(c * ox - s * oz), y: 0, z: -(s * ox + c * oz) };
     space = floor.getOffsetReferenceSpace(new XRRigidTransform(origin, { x: 0, y: Math.sin(-turn / 2), z: 0, w: Math.cos(-turn / 2) }));
     placed = true;
+    xr.first = null;
   }
 
   function draw(time, xrFrame) {
@@ -69,6 +71,7 @@ export function createXr(gl, { agentRoot, frame, onHead, onGaze, onInterrupt, on
     const pose = xrFrame.getViewerPose(space);
     if (!pose) return;
     const head = pose.transform.position, layer = session.renderState.baseLayer;
+    xr.first ??= { user: [head.x, head.y, head.z], agent: { ...agentRoot() } };
     onHead([head.x, head.y, head.z]);
     sticks();
     const views = pose.views.map((view) => {

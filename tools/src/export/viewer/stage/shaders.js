@@ -103,7 +103,7 @@ void main() {
   float fill = clamp(dot(n, normalize(vec3(-0.7, 0.15, 0.5))) * 0.5 + 0.5, 0.0, 1.0);
   float sky = 0.5 + 0.5 * n.y;
   float open = vOcclusion * mix(0.62, 1.0, smoothstep(0.0, 0.5, vWorld.y + 0.35 * n.y));
-  vec3 light = vec3(1.00, 0.95, 0.88) * (0.92 * wrap * wrap * mix(0.25, 1.0, lit));
+  vec3 light = vec3(1.00, 0.95, 0.88) * (0.92 * wrap * wrap * mix(tint == 1 ? 0.6 : 0.25, 1.0, lit));
   light += open * (mix(vec3(0.24, 0.23, 0.25), vec3(0.46, 0.50, 0.58), sky) * uShade + vec3(0.10, 0.11, 0.15) * fill);
   float rim = pow(1.0 - clamp(dot(n, v), 0.0, 1.0), 3.5);
   vec3 h = normalize(KEY + v);

@@ -6,7 +6,7 @@ const TINT = { body: 0, skin: 1, hair: 2, eye: 3, shell: 4, visor: 5, lips: 6, i
 const FACE_BONES = ["leftEye", "rightEye", "leftLid", "rightLid", "leftBrow", "rightBrow", "upperLip", "lowerLip", "mouth"];
 
 // Where the edges of the lids stand when the eye is open, degrees above straight ahead.
-const LIDS = { open: 30, lower: -30 };
+const LIDS = { open: 25, lower: -28 };
 
 function createShapes(d) {
   const joint = (name) => d.index.get(name);
