@@ -126,9 +126,9 @@ pub use level::Level;
 pub use linear::Epilogue;
 pub use matrix::Matrix;
 pub use rows::RowTable;
-pub(crate) use weights::signed;
 #[cfg(any(test, feature = "kernel-tests"))]
 pub use testing::Agreement;
+pub(crate) use weights::signed;
 pub use weights::{I4_GROUP, WeightData, Weights};
 
 use crate::error::Result;

@@ -51,9 +51,7 @@ fn columns<L: Madd>(level: L, value: impl Fn(usize) -> v128, bias: &[f32], finis
     let value = |at| f32x4_add(value(at), load4(bias, at));
     match finish {
         Finish::Store => each(y, |_, at| values(&value, at), |_, at| values(&value, at)),
-        Finish::Gelu => {
-            each(y, |_, at| gelu(level, values(&value, at)), |_, at| gelu(level, values(&value, at)))
-        }
+        Finish::Gelu => each(y, |_, at| gelu(level, values(&value, at)), |_, at| gelu(level, values(&value, at))),
         Finish::Add => each(y, |y, at| sum(y, values(&value, at)), |y, at| sum(y, values(&value, at))),
         Finish::GatedAdd(gate) => {
             let gate = |at| load4(gate, at);

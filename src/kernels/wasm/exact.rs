@@ -69,10 +69,7 @@ fn low_bits(sum: [v128; 2]) -> v128 {
 /// To floats.
 #[inline(always)]
 fn round(sum: [v128; 2]) -> [v128; 2] {
-    [
-        f64x2_promote_low_f32x4(f32x4_demote_f64x2_zero(sum[0])),
-        f64x2_promote_low_f32x4(f32x4_demote_f64x2_zero(sum[1])),
-    ]
+    [f64x2_promote_low_f32x4(f32x4_demote_f64x2_zero(sum[0])), f64x2_promote_low_f32x4(f32x4_demote_f64x2_zero(sum[1]))]
 }
 
 /// The sums with ties moved to the side on which the exact sum lies.
@@ -103,8 +100,8 @@ fn settle(p: f64, c: f64) -> f64 {
 
 #[cfg(any(test, feature = "kernel-tests"))]
 pub(super) mod tests {
-    use crate::kernels::testing::Random;
     use super::*;
+    use crate::kernels::testing::Random;
 
     #[cfg_attr(test, test)]
     pub(in crate::kernels) fn multiply_adds_round_once() {
