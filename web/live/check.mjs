@@ -132,13 +132,13 @@ const checks = {
       const { user: [x, , z], agent } = await page.evaluate(() => window.visavisLive.xr.first), far = Math.hypot(x - agent.x, z - agent.z);
       const ahead = off({ bearing: Math.atan2(x - agent.x, z - agent.z), yaw: agent.yaw });
       claim(far > 1.4 && far < 1.6 && ahead < 8, `${mode}: the user stands ${far.toFixed(2)} m away, not 1.5, ${ahead.toFixed(0)} degrees beside where the agent faces`);
-      // A quarter circle round the agent, in the headset's coordinates 1.5 m ahead, in five seconds.
+      // A quarter circle round the agent, which is 1.5 m ahead, in five seconds.
       await page.evaluate(async () => {
-        const { x, y, z } = device.position, begun = performance.now();
+        const { x, y, z } = device.position, h = 2 * Math.atan2(device.quaternion.y, device.quaternion.w), begun = performance.now();
         for (let t = 0; t < 1; t = Math.min(1, (performance.now() - begun) / 5000)) {
           const a = t * Math.PI / 2;
-          device.position.set(x + 1.5 * Math.sin(a), y, z - 1.5 + 1.5 * Math.cos(a));
-          device.quaternion.set(0, Math.sin(a / 2), 0, Math.cos(a / 2));
+          device.position.set(x + 1.5 * (Math.sin(h + a) - Math.sin(h)), y, z + 1.5 * (Math.cos(h + a) - Math.cos(h)));
+          device.quaternion.set(0, Math.sin((h + a) / 2), 0, Math.cos((h + a) / 2));
           await new Promise((r) => setTimeout(r, 16));
         }
       });
