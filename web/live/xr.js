@@ -10,7 +10,7 @@ const AWAY = 1.5;
 export function createXr(gl, { agentRoot, frame, onHead, onGaze, onInterrupt, onChange }) {
   // `first`: where both stood in the first picture after the user was placed.
   const xr = { mode: null, first: null, offers: { vr: false, ar: false } };
-  let session = null, floor = null, space = null, placed = false;
+  let session = null, floor = null, lie = null;
 
   xr.look = async () => {
     const can = (mode) => navigator.xr?.isSessionSupported(mode).catch(() => false) ?? false;
@@ -31,8 +31,8 @@ export function createXr(gl, { agentRoot, frame, onHead, onGaze, onInterrupt, on
     await gl.makeXRCompatible();
     session.updateRenderState({ baseLayer: new XRWebGLLayer(session, gl), depthNear: 0.05, depthFar: 80 });
     floor = await session.requestReferenceSpace("local-floor");
-    floor.addEventListener?.("reset", () => { placed = false; });
-    [space, placed] = [floor, false];
+    floor.addEventListener?.("reset", () => { lie = null; });
+    lie = null;
     xr.mode = mode;
     onChange();
     session.requestAnimationFrame(draw);
@@ -53,31 +53,28 @@ export function createXr(gl, { agentRoot, frame, onHead, onGaze, onInterrupt, on
     const turn = yaw + Math.PI - heading, [s, c] = [Math.sin(turn), Math.cos(turn)];
     const [wx, wz] = [x + AWAY * Math.sin(yaw), z + AWAY * Math.cos(yaw)];
     const [ox, oz] = [wx - (c * p.x + s * p.z), wz - (c * p.z - s * p.x)];
-    // An offset space is given by where its origin lies in the old one: the inverse.
-    const origin = { x: -(c * ox - s * oz), y: 0, z: -(s * ox + c * oz) };
-    space = floor.getOffsetReferenceSpace(new XRRigidTransform(origin, { x: 0, y: Math.sin(-turn / 2), z: 0, w: Math.cos(-turn / 2) }));
-    placed = true;
     xr.first = null;
+    lie = {
+      // A point of the headset's floor in the world, and the world's matrix in the headset's.
+      at: ({ x: a, y: b, z: d }) => [ox + c * a + s * d, b, oz - s * a + c * d],
+      back: [c, 0, s, 0, 0, 1, 0, 0, -s, 0, c, 0, s * oz - c * ox, 0, -s * ox - c * oz, 1],
+    };
   }
 
   function draw(time, xrFrame) {
     if (xrFrame.session !== session) return;
     session.requestAnimationFrame(draw);
-    if (!placed) {
-      const first = xrFrame.getViewerPose(floor);
-      if (!first) return;
-      lay(first);
-    }
-    const pose = xrFrame.getViewerPose(space);
+    const pose = xrFrame.getViewerPose(floor);
     if (!pose) return;
-    const head = pose.transform.position, layer = session.renderState.baseLayer;
-    xr.first ??= { user: [head.x, head.y, head.z], agent: { ...agentRoot() } };
-    onHead([head.x, head.y, head.z]);
+    if (!lie) lay(pose);
+    const head = lie.at(pose.transform.position), layer = session.renderState.baseLayer;
+    xr.first ??= { user: head, agent: { ...agentRoot() } };
+    onHead(head);
     sticks();
     const views = pose.views.map((view) => {
-      const { position } = view.transform, camera = view.transform.inverse.matrix;
+      const camera = multiply(view.transform.inverse.matrix, lie.back);
       return {
-        eye: [position.x, position.y, position.z], viewport: layer.getViewport(view),
+        eye: lie.at(view.transform.position), viewport: layer.getViewport(view),
         projection: view.projectionMatrix, camera, matrix: multiply(view.projectionMatrix, camera),
       };
     });
