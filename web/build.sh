@@ -16,7 +16,7 @@ mkdir -p "$out"
 for module in simd128 relaxed; do
   features=+simd128
   [ $module = simd128 ] || features+=,+relaxed-simd
-  web/wasm.sh "$features" visavis-web --profile dist --lib "$out/visavis-$module.wasm"
+  cp "$(web/module.sh "$features" visavis-web --profile dist)" "$out/visavis-$module.wasm"
 done
 cp web/npm/*.js web/npm/*.d.ts web/npm/package.json web/npm/README.md LICENSE-* "$out"
 ls -l "$out"/*.wasm | awk '{ print $NF ": " $5 " bytes" }'

@@ -55,9 +55,8 @@
 //! **WebAssembly.** Features are a whole module's (`-Ctarget-feature`): a module is built for
 //! [`Level::Simd128`] or for [`Level::Relaxed`], which has the variants of both, and the host takes
 //! the one that its engine validates. What relaxed instructions compute is the engine's choice, so
-//! it is tried before it is relied on: a fused multiply-add when the level is looked for, else the
-//! exact one is used, and products of bytes at the first of them. `web/kernels_check.sh` runs the
-//! tests there.
+//! the one that is used, `relaxed_madd`, is tried when the level is looked for, and the exact level
+//! is used where it is not fused. `web/kernels_check.sh` runs the tests there.
 //!
 //! **Same bits everywhere.** Every variant of every operation gives the bits of the scalar
 //! reference: integer sums are exact, and each float operation fixes its order of summation (16

@@ -1,62 +1,31 @@
 //! The eight products of a lane of 16 bits, each pair at most 2 * 15 * 127, add up to at most
-//! 30,480, so a group is summed in 16 bits and widened once. Nibbles lie within the seven bits that
-//! every engine's relaxed dot product multiplies exactly.
+//! 30,480, so a group is summed in 16 bits and widened once.
 
 use std::arch::wasm32::*;
 
 use super::{GROUP, Geometry, Job, NR, Tile};
 use crate::kernels::f32x16::F32x16;
-use crate::kernels::level::token;
 use crate::kernels::packed::for_blocks;
 use crate::kernels::wasm::Madd;
 
 /// Rows of one panel whose accumulators fit the registers, beside their activations.
 const ROOM: usize = 2;
 
-/// A way to multiply nibbles and bytes, on a level's token.
-pub(super) trait Nibbles: Madd {
-    /// Four bytes of activations, which each lane has.
-    type X: Copy;
-
-    fn x(self, x: v128) -> Self::X;
-
-    /// Adds to each of the eight lanes of `sum` two products.
-    fn dot(self, sum: v128, nibbles: v128, x: Self::X) -> v128;
+/// Even and odd bytes of activations, widened.
+#[inline(always)]
+fn pairs(x: v128) -> [v128; 2] {
+    [i16x8_shr(i16x8_shl(x, 8), 8), i16x8_shr(x, 8)]
 }
 
-impl Nibbles for token::Simd128 {
-    /// Even and odd bytes, widened.
-    type X = [v128; 2];
-
-    #[inline(always)]
-    fn x(self, x: v128) -> [v128; 2] {
-        [i16x8_shr(i16x8_shl(x, 8), 8), i16x8_shr(x, 8)]
-    }
-
-    #[inline(always)]
-    fn dot(self, sum: v128, nibbles: v128, x: [v128; 2]) -> v128 {
-        let (even, odd) = (v128_and(nibbles, i16x8_splat(15)), u16x8_shr(nibbles, 8));
-        i16x8_add(sum, i16x8_add(i16x8_mul(even, x[0]), i16x8_mul(odd, x[1])))
-    }
-}
-
-#[cfg(target_feature = "relaxed-simd")]
-impl Nibbles for token::Relaxed {
-    type X = v128;
-
-    #[inline(always)]
-    fn x(self, x: v128) -> v128 {
-        x
-    }
-
-    #[inline(always)]
-    fn dot(self, sum: v128, nibbles: v128, x: v128) -> v128 {
-        i16x8_add(sum, i16x8_relaxed_dot_i8x16_i7x16(x, nibbles))
-    }
+/// Adds to each of the eight lanes of `sum` its two products with nibbles.
+#[inline(always)]
+fn add(sum: v128, nibbles: v128, x: [v128; 2]) -> v128 {
+    let (even, odd) = (v128_and(nibbles, i16x8_splat(15)), u16x8_shr(nibbles, 8));
+    i16x8_add(sum, i16x8_add(i16x8_mul(even, x[0]), i16x8_mul(odd, x[1])))
 }
 
 #[inline(always)]
-pub(super) fn run<L: Nibbles>(level: L, job: &Job<'_>, tile: &mut Tile<f32>) {
+pub(super) fn run<L: Madd>(level: L, job: &Job<'_>, tile: &mut Tile<f32>) {
     job.check();
     for_blocks!(
         0..job.x.rows, job.panels.count, ROOM, R in [1 2], P in [1],
@@ -66,7 +35,7 @@ pub(super) fn run<L: Nibbles>(level: L, job: &Job<'_>, tile: &mut Tile<f32>) {
 
 /// Rows from `from.0`, panel `from.1` of the job.
 #[inline(never)]
-fn block<L: Nibbles, const R: usize>(level: L, job: &Job<'_>, from: (usize, usize), tile: &mut Tile<f32>) {
+fn block<L: Madd, const R: usize>(level: L, job: &Job<'_>, from: (usize, usize), tile: &mut Tile<f32>) {
     let (groups, panel, stride) = (job.geo.groups, job.geo.panel, job.x.stride);
     let start = (job.panels.first + from.1) * panel;
     let weights = job.weights[start..][..panel].as_ptr();
@@ -78,12 +47,12 @@ fn block<L: Nibbles, const R: usize>(level: L, job: &Job<'_>, from: (usize, usiz
     for g in 0..groups {
         let mut acc = [[i16x8_splat(0); 4]; R];
         for j in 0..GROUP / 8 {
-            let mut x = [[level.x(low); 2]; R];
+            let mut x = [[pairs(low); 2]; R];
             for r in 0..R {
                 for h in 0..2 {
                     // SAFETY: 4 bytes of group g of row r, within R rows, `stride` apart.
                     let four = unsafe { v128_load32_splat(q.add(r * stride + g * GROUP + 8 * j + 4 * h).cast()) };
-                    x[r][h] = level.x(four);
+                    x[r][h] = pairs(four);
                 }
             }
             for i in 0..4 {
@@ -91,7 +60,7 @@ fn block<L: Nibbles, const R: usize>(level: L, job: &Job<'_>, from: (usize, usiz
                 let w = unsafe { v128_load(weights.add(Geometry::nibbles(g) + j * 64 + i * 16).cast()) };
                 let (a, b) = (v128_and(w, low), u8x16_shr(w, 4));
                 for r in 0..R {
-                    acc[r][i] = level.dot(level.dot(acc[r][i], a, x[r][0]), b, x[r][1]);
+                    acc[r][i] = add(add(acc[r][i], a, x[r][0]), b, x[r][1]);
                 }
             }
         }

@@ -146,6 +146,5 @@ operation! {
     (Avx2 => avx2::run, Layout::QuadsPaired)
     (AvxVnni => avxvnni::run, Layout::QuadsOffset)
     (Avx512 => avx512::run, Layout::QuadsOffset)
-    (Simd128 => wasm::exact, Layout::Quads)
-    (Relaxed => wasm::relaxed, Layout::Quads)
+    (Simd128 => wasm::run, Layout::Quads)
 }
