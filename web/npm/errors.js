@@ -25,3 +25,7 @@ export class VisavisError extends Error {
 }
 
 export const argument = (message) => new VisavisError("argument", message);
+
+/** A value of any kind, for a message: neither JSON nor a template takes all of them. */
+export const named = (value) =>
+  typeof value === "string" ? JSON.stringify(value) : value !== null && typeof value === "object" ? "an object" : String(value);

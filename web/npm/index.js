@@ -10,7 +10,8 @@ export { VisavisError };
 
 export const Visavis = {
   /** Loads a bundle; see index.d.ts. */
-  async load({ bundle, wasm = {}, module, worker, inline = typeof Worker !== "function", onProgress } = {}) {
+  async load(options) {
+    const { bundle, wasm = {}, module, worker, inline = typeof Worker !== "function", onProgress } = options ?? {};
     if (bundle === undefined || bundle === null) throw argument("bundle: the URL or the bytes of a .safetensors file");
     const choice = chooseModule(module);
     const source = wasm[choice] ?? { relaxed: () => new URL("./visavis-relaxed.wasm", import.meta.url), simd128: () => new URL("./visavis-simd128.wasm", import.meta.url) }[choice]();
@@ -35,8 +36,9 @@ class Engine {
     this.facts = facts;
   }
 
-  session(options = {}) {
-    return new Session(this.#link, this.facts, ++this.#sessions, options);
+  session(options) {
+    if (typeof (options ?? {}) !== "object") throw argument("options of a session: an object");
+    return new Session(this.#link, this.facts, ++this.#sessions, options ?? {});
   }
 
   close() {
@@ -69,7 +71,8 @@ async function read(bundle, onProgress) {
     const { done, value } = await reader.read();
     if (done) break;
     parts.push(value);
-    onProgress?.({ loaded: (loaded += value.length), total });
+    loaded += value.length;
+    onProgress?.({ loaded, total });
   }
   const bytes = new Uint8Array(loaded);
   let at = 0;

@@ -1,6 +1,6 @@
 // Which of the two modules this engine can run: one with instructions that it does not know does not validate as a whole.
 
-import { VisavisError } from "./errors.js";
+import { VisavisError, named } from "./errors.js";
 
 // A function with nothing but one instruction on a local vector.
 const probe = (body) => new Uint8Array([
@@ -14,7 +14,7 @@ const RELAXED_MADD = probe([0x20, 0, 0x20, 0, 0x20, 0, 0xfd, 0x85, 0x02]); // f3
 /** The best module that can run here, `"relaxed"` or `"simd128"`, or the one that is `wanted`. */
 export function chooseModule(wanted) {
   if (wanted !== undefined && wanted !== "relaxed" && wanted !== "simd128") {
-    throw new VisavisError("argument", `module ${JSON.stringify(wanted)}: "relaxed" or "simd128"`);
+    throw new VisavisError("argument", `module ${named(wanted)}: "relaxed" or "simd128"`);
   }
   if (typeof WebAssembly !== "object" || !WebAssembly.validate(ADD)) {
     throw new VisavisError("unsupported", "This browser has no WebAssembly with SIMD: use a current Chrome, Edge, Firefox or Safari (16.4 or newer).");

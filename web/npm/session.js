@@ -1,6 +1,6 @@
 // A session as the page sees it. Pushes never wait and are never refused: they are messages to the worker.
 
-import { VisavisError, argument } from "./errors.js";
+import { VisavisError, argument, named } from "./errors.js";
 import { Recent, framesOf } from "./frames.js";
 
 const VOICES = { agent: 0, user: 1 };
@@ -24,8 +24,8 @@ export class Session {
   #ended = null;
 
   constructor(link, facts, id, { clock = "real", ...options }) {
-    if (clock !== "real" && clock !== "manual") throw argument(`clock ${JSON.stringify(clock)}: "real" or "manual"`);
-    if (options.gaze !== undefined && options.gaze !== null) number("gaze", options.gaze);
+    if (clock !== "real" && clock !== "manual") throw argument(`clock ${named(clock)}: "real" or "manual"`);
+    checked(options);
     this.#link = link;
     this.#joints = facts.joints.length;
     this.#id = id;
@@ -155,21 +155,33 @@ export class Session {
   }
 }
 
+/** What JSON would turn into null, or cannot hold, is told here; ranges are the module's business. */
+function checked(options) {
+  for (const [name, value] of Object.entries(options)) {
+    const values = Array.isArray(value) ? value : [value];
+    values.forEach((v) => typeof v === "number" && number(name, v));
+    typed(`option ${name}`, "a number, a string, a boolean, null, or numbers", values.every(plain));
+  }
+  if (typeof options.gaze === "string") throw argument(`gaze ${JSON.stringify(options.gaze)}: a number or null`);
+}
+
+const plain = (value) => value === null || ["number", "string", "boolean", "undefined"].includes(typeof value);
+
 function which(who) {
-  if (!Object.hasOwn(VOICES, who)) throw argument(`voice ${JSON.stringify(who)}: "agent" or "user"`);
+  if (!Object.hasOwn(VOICES, who)) throw argument(`voice ${named(who)}: "agent" or "user"`);
   return VOICES[who];
 }
 
 function voice(samples, rate) {
   if (!(samples instanceof Float32Array)) throw argument("samples: a Float32Array of mono sound, full scale 1");
-  if (!Number.isInteger(rate) || rate < 8000 || rate > 192000) throw new VisavisError("audio", `a rate of ${rate} Hz: 8000 to 192000`);
+  if (!Number.isInteger(rate) || rate < 8000 || rate > 192000) throw new VisavisError("audio", `a rate of ${named(rate)} Hz: 8000 to 192000`);
   if (samples.length > 60 * MAX_MINUTES_AHEAD * rate) throw new VisavisError("audio", "more than a minute of sound at once: push it in pieces as it is heard");
   // A copy: the page goes on writing to its own.
   return [samples.slice(), rate];
 }
 
 function number(name, value) {
-  if (typeof value !== "number" || !Number.isFinite(value)) throw argument(`${name} is ${value}: a finite number`);
+  if (typeof value !== "number" || !Number.isFinite(value)) throw argument(`${name} is ${named(value)}: a finite number`);
   return value;
 }
 

@@ -59,13 +59,22 @@ test("frames come in order, in metres and unit quaternions", async () => {
       for (const at of [j, j + 7]) assert.ok(Math.abs(Math.hypot(...f.joints.subarray(at, at + 4)) - 1) < 1e-4);
     }
   });
-  assert.equal(frames[0].gaze, null);
-  assert.equal(typeof frames.at(-1).gaze, "number");
+  assert.ok(frames.every((f) => f.gaze >= -1 && f.gaze <= 1));
   const shown = session.shown();
   assert.ok(Math.abs(shown.frame.time - (2 - 4 / 30)) < 1.01 / 30, `${shown.frame.time}`);
   const stats = await session.stats();
   assert.equal(stats.blocks, 15);
   assert.ok(stats.blockMs.p50 > 0 && stats.memoryBytes > 0 && stats.head.accepted > 0);
+  engine.close();
+});
+
+test("while nobody knows where the user is, there is no gaze score", async () => {
+  const engine = await load();
+  const session = engine.session({ clock: "manual", sampler: "single" });
+  let frames;
+  session.onFrames = (four) => (frames = four);
+  await session.advance(0.1);
+  assert.deepEqual(frames.map((f) => f.gaze), [null, null, null, null]);
   engine.close();
 });
 

@@ -1,16 +1,21 @@
-// The same motion, to the bit, as natively (digests.txt), with both modules.
+// The same motion, to the bit, as natively (digests.txt), with both modules. VISAVIS_SCALAR names a module built without SIMD,
+// which no package has: web/wasm.sh +sign-ext visavis-web --profile dist out/web/visavis-scalar.wasm
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import test from "node:test";
 import { cases, motion } from "./scene.js";
 import { load, root } from "./load.js";
 
-for (const module of ["simd128", "relaxed"]) {
+const modules = [{ module: "simd128" }, { module: "relaxed" }];
+if (process.env.VISAVIS_SCALAR) modules.push({ module: "simd128", wasm: { simd128: readFileSync(process.env.VISAVIS_SCALAR) }, name: "scalar" });
+
+for (const { name, ...chosen } of modules) {
   for (const bundle of ["tests/goldens/tiny.safetensors", "models/visavis-base-i8.safetensors"]) {
-    test(`${module}, ${bundle}`, async () => {
-      const engine = await load({ bundle, module });
+    test(`${name ?? chosen.module}, ${bundle}`, async () => {
+      const engine = await load({ bundle, ...chosen });
       const wanted = cases(readFileSync(new URL("digests.txt", import.meta.url), "utf8")).filter((c) => c.bundle === bundle);
       assert.ok(wanted.length > 1);
+      if (name) assert.equal(engine.facts.level, name);
       for (const one of wanted) assert.equal(await motion(engine, one), one.digest, `${JSON.stringify(one.options)} on ${engine.facts.level}`);
       engine.close();
     });

@@ -1,0 +1,11 @@
+import { Visavis } from "visavis";
+const at = (name) => new URL(name, globalThis.BASE ?? import.meta.url);
+const wasm = globalThis.WASM && { relaxed: at("visavis-relaxed.wasm"), simd128: at("visavis-simd128.wasm") };
+const engine = await Visavis.load({ bundle: at("tiny.safetensors"), wasm, worker: globalThis.WASM && at("worker.js") });
+const session = engine.session({ sampler: "single", gaze: 0.8, clock: "manual" });
+let frames = 0;
+session.onFrames = (block) => (frames += block.length);
+session.pushUserHead(0, 1.6, 1.5);
+await session.advance(2);
+globalThis.FRAMES = frames;
+engine.close();
