@@ -36,7 +36,21 @@ const ROOMS: &[(&str, &str, &[&str])] = &[
     (
         "session",
         "one conversation",
-        &["audio", "clock", "config", "engine", "error", "flow", "frame", "kernels", "normaliser", "par", "pose", "user", "vae"],
+        &[
+            "audio",
+            "clock",
+            "config",
+            "engine",
+            "error",
+            "flow",
+            "frame",
+            "kernels",
+            "normaliser",
+            "par",
+            "pose",
+            "user",
+            "vae",
+        ],
     ),
     (
         "quant",

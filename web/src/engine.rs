@@ -1,7 +1,7 @@
 //! Engines.
 
-use crate::status::{refuse, tell, tell_panics};
 use crate::slice;
+use crate::status::{refuse, tell, tell_panics};
 use serde::Serialize;
 use std::sync::Arc;
 use visavis::{BLOCK_FRAMES, Engine, FPS};

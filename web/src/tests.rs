@@ -94,8 +94,9 @@ fn motion(engine: *const Engine, options: &str, blocks: usize) -> String {
 
 #[test]
 fn motion_is_that_of_the_file_that_webassembly_is_compared_with() {
-    let mut lines =
-        String::from("# Bundle, blocks, options, digest. src/tests.rs computes them; VISAVIS_DIGESTS=write rewrites.\n");
+    let mut lines = String::from(
+        "# Bundle, blocks, options, digest. src/tests.rs computes them; VISAVIS_DIGESTS=write rewrites.\n",
+    );
     let tiny = "tests/goldens/tiny.safetensors";
     let shipped = "models/visavis-base-i8.safetensors";
     let cases = [

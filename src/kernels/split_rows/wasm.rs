@@ -2,8 +2,8 @@
 
 use std::arch::wasm32::*;
 
-use super::scalar::{self, RANGE};
 use super::BASE;
+use super::scalar::{self, RANGE};
 use crate::kernels::quantize_rows::wasm::{largest, sum_of};
 use crate::kernels::quantize_rows::{GROUP, MAGIC, scalable};
 use crate::kernels::wasm::load;

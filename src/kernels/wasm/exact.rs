@@ -44,10 +44,8 @@ impl Madd for Simd128 {
             sum[i] = sums(a[i], b[i], c[i]);
         }
         // A tie is the least of all words.
-        let least = i32x4_min(
-            i32x4_min(low_bits(sum[0]), low_bits(sum[1])),
-            i32x4_min(low_bits(sum[2]), low_bits(sum[3])),
-        );
+        let least =
+            i32x4_min(i32x4_min(low_bits(sum[0]), low_bits(sum[1])), i32x4_min(low_bits(sum[2]), low_bits(sum[3])));
         if v128_any_true(i32x4_eq(least, i32x4_splat(TIE))) {
             for i in 0..4 {
                 sum[i] = settled(a[i], b[i], c[i]);
@@ -77,10 +75,7 @@ fn low_bits(sum: [v128; 2]) -> v128 {
 /// To floats.
 #[inline(always)]
 fn round(sum: [v128; 2]) -> [v128; 2] {
-    [
-        f64x2_promote_low_f32x4(f32x4_demote_f64x2_zero(sum[0])),
-        f64x2_promote_low_f32x4(f32x4_demote_f64x2_zero(sum[1])),
-    ]
+    [f64x2_promote_low_f32x4(f32x4_demote_f64x2_zero(sum[0])), f64x2_promote_low_f32x4(f32x4_demote_f64x2_zero(sum[1]))]
 }
 
 /// The sums with ties moved to the side on which the exact sum lies.

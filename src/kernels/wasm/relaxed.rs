@@ -76,7 +76,8 @@ pub(in crate::kernels) fn dot() -> Dot {
             sums[0][i / 4] += i32::from(first[i]) * i32::from(second[i] as i8);
             sums[1][i / 4] += i32::from(first[i]) * i32::from(second[i]);
         }
-        let found = i32x4_relaxed_dot_i8x16_i7x16_add(super::load(&first, 0), super::load(&second, 0), i32x4_splat(at as i32));
+        let found =
+            i32x4_relaxed_dot_i8x16_i7x16_add(super::load(&first, 0), super::load(&second, 0), i32x4_splat(at as i32));
         for (kind, sums) in kinds.iter_mut().zip(&sums) {
             let expected = i32x4_add(super::load(sums, 0), i32x4_splat(at as i32));
             *kind &= i32x4_all_true(i32x4_eq(found, expected));
