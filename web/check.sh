@@ -11,3 +11,5 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 cargo test -p visavis-web
 node "${node_flags[@]}" --test web/tests/*.test.js
 web/tests/pack/run
+# The live page, as a person would try it.
+web/page_check.sh

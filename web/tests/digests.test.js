@@ -1,5 +1,5 @@
 // The same motion, to the bit, as natively (digests.txt), with both modules. VISAVIS_SCALAR names a module built without SIMD,
-// which no package has: web/wasm.sh +sign-ext visavis-web --profile dist out/web/visavis-scalar.wasm
+// which no package has: web/module.sh +sign-ext visavis-web --profile dist
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import test from "node:test";

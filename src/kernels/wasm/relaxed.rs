@@ -43,3 +43,44 @@ pub(in crate::kernels) fn is_fused() -> bool {
     let found = f32x4_relaxed_madd(f32x4_add(one, e), f32x4_sub(one, e), f32x4_neg(one));
     i32x4_all_true(f32x4_eq(found, f32x4_neg(f32x4_mul(e, e))))
 }
+<<<<<<< HEAD
+=======
+
+/// What `relaxed_dot_i8x16_i7x16_add` makes of a second operand beyond seven bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::kernels) enum Dot {
+    /// Signed bytes, exact sums.
+    Signed,
+    /// Unsigned bytes, exact sums.
+    Unsigned,
+    /// Anything else: what lies within seven bits is exact everywhere.
+    Seven,
+}
+
+/// What it does here.
+pub(in crate::kernels) fn dot() -> Dot {
+    // The largest sums of pairs of either kind, which 16 bits do not hold, and small ones.
+    let a = [-127i8, -127, 127, 127, -127, 127, 3, -5].map(black_box);
+    let b = [0xffu8, 0xff, 0xff, 0xff, 0x80, 0x80, 0x80, 0x81].map(black_box);
+    let mut kinds = [true; 2];
+    for at in 0..8 {
+        let (mut first, mut second, mut sums) = ([0i8; 16], [0u8; 16], [[0i32; 4]; 2]);
+        for i in 0..16 {
+            (first[i], second[i]) = (a[(i + at) % 8], b[(i * (1 + at % 3)) % 8]);
+            sums[0][i / 4] += i32::from(first[i]) * i32::from(second[i] as i8);
+            sums[1][i / 4] += i32::from(first[i]) * i32::from(second[i]);
+        }
+        let found =
+            i32x4_relaxed_dot_i8x16_i7x16_add(super::load(&first, 0), super::load(&second, 0), i32x4_splat(at as i32));
+        for (kind, sums) in kinds.iter_mut().zip(&sums) {
+            let expected = i32x4_add(super::load(sums, 0), i32x4_splat(at as i32));
+            *kind &= i32x4_all_true(i32x4_eq(found, expected));
+        }
+    }
+    match kinds {
+        [true, _] => Dot::Signed,
+        [_, true] => Dot::Unsigned,
+        _ => Dot::Seven,
+    }
+}
+>>>>>>> page
