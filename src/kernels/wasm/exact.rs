@@ -37,12 +37,6 @@ impl Madd for Simd128 {
             // A tie is the least of all words.
             least = i32x4_min(least, low_bits(sum[i]));
         }
-<<<<<<< HEAD
-=======
-        // A tie is the least of all words.
-        let least =
-            i32x4_min(i32x4_min(low_bits(sum[0]), low_bits(sum[1])), i32x4_min(low_bits(sum[2]), low_bits(sum[3])));
->>>>>>> page
         if v128_any_true(i32x4_eq(least, i32x4_splat(TIE))) {
             for i in 0..N {
                 sum[i] = settled(a[i], b[i], c[i]);
