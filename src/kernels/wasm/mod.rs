@@ -77,5 +77,4 @@ pub(super) fn store4(to: &mut [f32], at: usize, v: v128) {
 
 /// Tests of what is below the operations.
 #[cfg(feature = "kernel-tests")]
-pub(super) const TESTS: [(&str, fn()); 1] =
-    [("multiply_adds_round_once", exact::tests::multiply_adds_round_once)];
+pub(super) const TESTS: [(&str, fn()); 1] = [("multiply_adds_round_once", exact::tests::multiply_adds_round_once)];
