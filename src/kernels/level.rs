@@ -143,7 +143,7 @@ impl Level {
         // What relaxed instructions do is the engine's choice.
         #[cfg(all(target_arch = "wasm32", target_feature = "relaxed-simd"))]
         if self == Self::Relaxed {
-            return super::wasm::is_fused();
+            return is_fused();
         }
         each_level!(self, detected)
     }
@@ -165,6 +165,18 @@ impl Level {
         };
         Err(missing(&format!("VISAVIS_CPU={name}: {reason}")))
     }
+}
+
+/// Whether `relaxed_madd` rounds once here. An engine computes it in one way as long as it runs.
+#[cfg(all(target_arch = "wasm32", target_feature = "relaxed-simd"))]
+fn is_fused() -> bool {
+    use std::arch::wasm32::*;
+    use std::hint::black_box;
+    // (1 + e)(1 - e) - 1 = -e^2, which is lost if the product is rounded to 1 first.
+    let e = f32x4_splat(black_box(f32::EPSILON));
+    let one = f32x4_splat(black_box(1.0));
+    let found = f32x4_relaxed_madd(f32x4_add(one, e), f32x4_sub(one, e), f32x4_neg(one));
+    i32x4_all_true(f32x4_eq(found, f32x4_neg(f32x4_mul(e, e))))
 }
 
 /// The error of a level that cannot be used, with those that can.

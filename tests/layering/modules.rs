@@ -9,6 +9,9 @@ use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+/// What marks code that is in no library that is shipped.
+const FOR_TESTS: [&str; 2] = ["[cfg(test)]", "[cfg(any(test,feature=\"kernel-tests\"))]"];
+
 /// A module by its path from the crate's root: `["kernels", "attend"]`.
 pub type Module = Vec<String>;
 
@@ -94,7 +97,7 @@ impl Modules {
                         path_attribute = path_of(group.stream()).or(path_attribute);
                         // An attribute is for the item that follows, which a body ends.
                         let body = group.delimiter() == Delimiter::Brace;
-                        for_tests = !body && (for_tests || group.to_string().replace(' ', "") == "[cfg(test)]");
+                        for_tests = !body && (for_tests || FOR_TESTS.contains(&&*group.to_string().replace(' ', "")));
                         self.tokens(group.stream(), module, folder, beside);
                     }
                     i += 1;

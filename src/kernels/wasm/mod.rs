@@ -15,8 +15,6 @@ mod math;
 mod relaxed;
 
 pub(super) use math::{each, exp, gelu, silu};
-#[cfg(target_feature = "relaxed-simd")]
-pub(super) use relaxed::is_fused;
 
 /// Multiply-adds of floats, on a level's token.
 pub(super) trait Madd: Copy {

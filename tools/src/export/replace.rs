@@ -8,14 +8,14 @@ use std::path::Path;
 /// Windows refuses it while another program holds `to` open without sharing its deletion. Scanners
 /// and indexers do so for moments after a file was written, so it is tried for half a second.
 pub(crate) fn replace(from: &Path, to: &Path) -> io::Result<()> {
-    const TRIES: u32 = if cfg!(windows) { 10 } else { 1 };
-    for _ in 1..TRIES {
+    let mut left = if cfg!(windows) { 10 } else { 0 };
+    loop {
         match std::fs::rename(from, to) {
-            Err(e) if is_held(&e) => std::thread::sleep(std::time::Duration::from_millis(50)),
+            Err(e) if is_held(&e) && left > 0 => std::thread::sleep(std::time::Duration::from_millis(50)),
             done => return done,
         }
+        left -= 1;
     }
-    std::fs::rename(from, to)
 }
 
 /// Whether Windows refused for what others have open; access is denied for that reason too.
