@@ -13,6 +13,9 @@ export async function createAgent({ bundle, wasm, worker, onError, ...options })
   let latest = 0, resting = null;
   session.delay = DELAY;
   session.onError = onError;
+  // Two people who are there and say nothing: a voice that was never pushed is absent, which is another condition.
+  session.setVoicePresent("agent", true);
+  session.setVoicePresent("user", true);
   session.onFrames = (frames) => {
     latest = frames[frames.length - 1].time + 1 / 30;
     agent.onBlock?.(frames);
