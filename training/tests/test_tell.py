@@ -29,7 +29,9 @@ def test_fidgeting_is_told_and_the_same_motion_is_not():
     told = tell.told(windows(x), windows(shaking), steps=60, nets=1)
     same = tell.told(windows(x), windows(x), steps=60, nets=1)
     assert told.shape == windows(x).shape[:2]
+    other = tell.told(windows(x), windows(x.roll(2, 0)), steps=60, nets=1)
     assert told.mean() > 0.95 and same.mean() == 0.5
+    assert abs(other.mean() - 0.5) < 1e-6
 
 
 def test_a_body_that_holds_a_pose_rests_and_one_that_waves_does_not():

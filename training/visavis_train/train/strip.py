@@ -1,6 +1,7 @@
 """Film strips of bodies at rest beside each other: a real person, and agents whose user stands and says nothing.
 
-    python -m visavis_train.train.strip --person CLIP --bundle NAME=B.safetensors ... --out strip.png [--seconds 24] [--student]
+    visavis generate --user-path STILL.csv --model B.safetensors --out DIR
+    python -m visavis_train.train.strip --person CLIP --motion NAME=DIR/motion.bvh ... --out strip.png [--seconds 24]
 
 A row a body: a figure every two seconds, seen from the front, in orange the hands' paths of the two seconds after it; below it the speed of the
 faster hand relative to the hips (`corpus/measures.py`) with the 3 cm/s below which hands are still.
@@ -9,41 +10,26 @@ import argparse
 
 import matplotlib
 import numpy as np
-import torch
 
-from .. import bundle as bundles
 from ..corpus import measures, store
 from ..motion import rig
-from ..nets.flow import Condition, absent
-from ..nets.stream import DecoderStream, Stream
-from .geometry import integrate, local_positions, to_local, to_world
+from ..motion.bvh import read_bvh
 
-EVERY = 60   # frames between figures
-AWAY = 1.5   # metres to the user
-SETTLE = 150  # frames after an agent's start that are not shown
+EVERY = 60  # frames between figures
 
 
-def rest(b, frames, student=False, seed=0):
-    """Joint positions [T, J, 3] and headings [T] of an agent of an open bundle before a user who stands still, both silent."""
-    torch.manual_seed(seed)
-    session, width = b.config["session"], b.config["audio"]["features"]
-    clean = session.get("clean_history") or {"tau": None, "from": 0.0}
-    stream = Stream(b.student if student else b.flow, 1, session["guidance"], session["gaze_guidance"], False, 4,
-                    b.config["student"]["tau_history"] if student else clean["tau"], clean["from"], student)
-    idle, heat = b.encode(b.idle()[None]), session.get("temperature", 1.0)
-    stream.warm(idle, torch.randn_like(idle), absent(1, idle.shape[1], width))
-    decoder, place = DecoderStream(b.vae.decoder, 1), lambda z: z * b.stat("latent_std") + b.stat("latent_mean")
-    for i in range(idle.shape[1]):
-        decoder.step(place(idle[:, i:i + 1]))
-    root, user, x, roots = torch.zeros(1, 3, dtype=torch.float64), torch.tensor([0.0, AWAY]).double().expand(1, 4, 2), [], []
-    for _ in range(-(-frames // 4)):
-        quiet = torch.zeros(1, 1, 4 * width)
-        cond = Condition(to_local(root, user).float().reshape(1, 1, 8), quiet, quiet, torch.zeros(1, 1, 4), torch.tensor([[[1.0, 0.0, 0.0, 0.0]]]))
-        x.append(b.unstandardise(decoder.step(place(stream.step(heat * torch.randn(1, 1, idle.shape[2]), cond))))[0])
-        roots.append(integrate(x[-1][:, :3].double(), root[0]))
-        root = roots[-1][-1:]
-    roots = torch.cat(roots)
-    return to_world(roots, local_positions(torch.cat(x)).double()).numpy()[:frames], roots[:frames, 2].numpy()
+def of_clip(path):
+    """Joint positions [T, J, 3] and headings [T] of a clip of a corpus."""
+    clip = store.load(path, voices=False)
+    return clip.positions.astype(np.float64), rig.yaw_of(rig.quat_to_mat(clip.rotations[:, 0]))
+
+
+def of_bvh(path):
+    """The same of a BVH file that the runtime wrote, which is in centimetres."""
+    take = read_bvh(path)
+    positions, rotations = take.fk()
+    joints = [take.skeleton.names.index(name) for name in rig.NAMES]
+    return positions[:, joints] / 100, rig.yaw_of(rotations[:, joints[0]])
 
 
 def drawn(positions, yaw):
@@ -59,7 +45,7 @@ def sheet(path, rows):
     import matplotlib.pyplot as plt
     columns = min(len(p) for _, p, _ in rows) // EVERY
     fig = plt.figure(figsize=(1.05 * columns, 2.9 * len(rows)))
-    grid = fig.add_gridspec(2 * len(rows), columns, height_ratios=[2.2, 0.7] * len(rows), hspace=0.18, wspace=0, left=0.05, right=0.99, top=0.96, bottom=0.04)
+    grid = fig.add_gridspec(2 * len(rows), columns, height_ratios=[2.2, 0.7] * len(rows), hspace=0.32, wspace=0, left=0.05, right=0.99, top=0.96, bottom=0.04)
     for r, (title, positions, yaw) in enumerate(rows):
         points, speed = drawn(positions, yaw)
         for c in range(columns):
@@ -88,25 +74,17 @@ def sheet(path, rows):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--person", required=True, help="clip of a person at rest")
-    parser.add_argument("--bundle", action="append", default=[], metavar="NAME=FILE")
+    parser.add_argument("--motion", action="append", default=[], metavar="NAME=BVH")
     parser.add_argument("--out", required=True)
     parser.add_argument("--seconds", type=float, default=24)
-    parser.add_argument("--from", dest="start", type=float, default=10, help="second of the clip that is shown first [10]")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--student", action="store_true", help="agents make each block in one evaluation")
+    parser.add_argument("--from", dest="start", type=float, default=10, help="second that is shown first [10]")
     args = parser.parse_args()
-    torch.set_num_threads(1)
-    frames, first = round(args.seconds * rig.FPS), round(args.start * rig.FPS)
-    clip = store.load(args.person, voices=False)
-    body = clip.positions[first:first + frames].astype(np.float64)
-    rows = [("a person who stands about", body, rig.yaw_of(rig.quat_to_mat(clip.rotations[first:first + frames, 0])))]
-    for given in args.bundle:
-        name, _, path = given.partition("=")
-        positions, yaw = rest(bundles.read(path), SETTLE + frames, args.student, args.seed)
-        rows.append((name, positions[SETTLE:], yaw[SETTLE:]))
+    first, last = round(args.start * rig.FPS), round((args.start + args.seconds) * rig.FPS)
+    given = [("a person who stands about", of_clip(args.person))] + [(name, of_bvh(path)) for name, _, path in (m.partition("=") for m in args.motion)]
+    rows = [(name, positions[first:last], yaw[first:last]) for name, (positions, yaw) in given]
     sheet(args.out, rows)
     for name, positions, yaw in rows:
-        print(f"{name}: hands still {(drawn(positions, yaw)[1] < measures.STILL).mean():.2f} of the time")
+        print(f"{name}: both hands still {(drawn(positions, yaw)[1] < measures.STILL).mean():.2f} of the time")
 
 
 if __name__ == "__main__":

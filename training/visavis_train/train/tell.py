@@ -2,7 +2,7 @@
 
     python -m visavis_train.train.tell --bundle B.safetensors --corpus DIR [--split test] [--clips 24] [--seconds 53] [--rows vae flow:0.75 student:0.75]
 
-For each row (named as in `train.stillness`; `other`: the corpus' motion of the next clip, real motion that nobody should tell) a net is trained on one half
+For each row (named as in `train.stillness`; `other`: the corpus' motion of another clip of the same half, real motion that cannot be told) a net is trained on one half
 of the clips and judged on the other, then the other way round, each with `--nets` seeds. It sees joint positions in the heading frame, their velocities and
 the root's step. Printed: accuracy on windows it was not trained on, its standard error by the jackknife over clips, and accuracy in windows in
 which the corpus' hands are still. 0.5 is chance, 1 is always told.
@@ -110,7 +110,7 @@ def main():
     real, rest = windows(seen(corpus[:, SETTLE:])), resting(corpus[:, SETTLE:], roots[:, SETTLE:])
     print(f"{len(corpus)} clips, {real.shape[1]} windows of each kind in each\n\n| row | told apart | at rest |\n|---|---|---|")
     for name in args.rows:
-        x = corpus.roll(1, 0) if name == "other" else judge.make(name)[0]
+        x = corpus.roll(2, 0) if name == "other" else judge.make(name)[0]
         right = told(real, windows(seen(x[:, SETTLE:].float())), args.steps, args.nets, args.seed)
         cells = (jackknife((right * m).sum(1), m.sum(1)) for m in (torch.ones_like(right), rest.float()))
         print(f"| {name} | " + " | ".join(f"{v:.3f} ± {e:.3f}" for v, e in cells) + " |", flush=True)
