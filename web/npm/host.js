@@ -56,6 +56,13 @@ export function serve(port) {
     }
   }
 
+  /** For who has no worker to end: nothing of the host goes on. */
+  function stop() {
+    clearInterval(timer);
+    port.onmessage = null;
+    sessions.clear();
+  }
+
   /** A session with its clock. */
   class Driven {
     #session;
@@ -178,4 +185,6 @@ export function serve(port) {
       }
     }
   }
+
+  return stop;
 }

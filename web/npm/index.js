@@ -48,7 +48,7 @@ class Engine {
 
 function inlined() {
   const [page, host] = inlinePair();
-  serve(host);
+  page.terminate = serve(host);
   return page;
 }
 
