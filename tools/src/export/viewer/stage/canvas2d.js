@@ -85,6 +85,8 @@ function createCanvas2d(canvas, d, shapes) {
       if (a && b) list.push({ a, b, ra: ra * a.scale, rb: rb * b.scale, colour, depth: 0.5 * (a.depth + b.depth) - nearer });
     };
     for (const s of shapes.all) {
+      // Nor can lids, which would hide the eyes.
+      if (s.cut && s.tint === TINT.skin) continue;
       const thin = s.s[0] > 1 ? s.s[0] ** 0.5 : 1;
       // Discs cannot be cut: hair is moved away from the face instead.
       const [p, q] = [s.a, s.b].map((x) => (s.cut ? add(x, scale(s.cut, -0.2 * s.ra)) : x));

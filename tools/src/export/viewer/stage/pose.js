@@ -66,7 +66,10 @@ function createPose(d) {
     return pose;
   };
 
-  // A point of the rest pose, carried by joint j.
-  pose.carry = (j, p) => add(pose.position[j], rotate(pose.rotation, sub(p, d.rest[j]), 4 * j));
+  // A point of the rest pose, carried by joint j or by a bone of the face.
+  pose.carry = (j, p) => [0, 4, 8].map((row) => {
+    const [x, y, z, w] = pose.skin.subarray(12 * j + row, 12 * j + row + 4);
+    return x * p[0] + y * p[1] + z * p[2] + w;
+  });
   return pose;
 }
