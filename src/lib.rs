@@ -9,6 +9,7 @@ mod audio;
 mod bounded;
 mod bundle;
 mod config;
+mod dram;
 mod engine;
 mod error;
 mod flow;
@@ -72,7 +73,7 @@ pub mod internals {
         ($($room:ident)*) => { $(pub mod $room { pub use crate::$room::*; })* };
     }
 
-    rooms!(audio bounded bundle config engine flow frame kernels nn normaliser par pose session user vae);
+    rooms!(audio bounded bundle config dram engine flow frame kernels nn normaliser par pose session user vae);
     #[cfg(feature = "quant")]
     rooms!(quant);
 }

@@ -123,6 +123,8 @@ namespace Visavis
         [DllImport(Library)] public static extern Status visavis_session_clear_audio(IntPtr session, int voice);
         [DllImport(Library)] public static extern Status visavis_session_set_audio_present(IntPtr session, int voice, int present);
         [DllImport(Library)] public static extern Status visavis_session_push_user_head(IntPtr session, float x, float y, float z, double time);
+        [DllImport(Library)] public static extern Status visavis_session_push_user_pose(IntPtr session, float x, float y, float z, float qx, float qy, float qz, float qw, double time);
+        [DllImport(Library)] public static extern Status visavis_session_dyadic(IntPtr session, [Out] float[] shares, UIntPtr capacity, out UIntPtr count);
         [DllImport(Library)] public static extern Status visavis_session_set_gaze(IntPtr session, float target);
         [DllImport(Library)] public static extern Status visavis_session_set_natural_gaze(IntPtr session);
         [DllImport(Library)] public static extern Status visavis_session_set_guidance(IntPtr session, float weight, float gaze);
@@ -224,6 +226,18 @@ namespace Visavis
         /// Positions are put in order by time; those that are late are counted.
         public void PushUserHead(float x, float y, float z, double time) =>
             Engine.Check(Native.visavis_session_push_user_head(handle, x, y, z, time));
+
+        /// The same with the head's rotation: a quaternion of about unit length, identity where the user faces +Z. Bundles of the kind `dram` look at it.
+        public void PushUserPose(float x, float y, float z, float qx, float qy, float qz, float qw, double time) =>
+            Engine.Check(Native.visavis_session_push_user_pose(handle, x, y, z, qx, qy, qz, qw, time));
+
+        /// How much each joint of the last block's frames follows the user, 0 to 1, into room for Joints.Length numbers; how many those are, 0 with
+        /// bundles of another kind than `dram`.
+        public int Dyadic(float[] shares)
+        {
+            Engine.Check(Native.visavis_session_dyadic(handle, shares, (UIntPtr)shares.Length, out var count));
+            return (int)count;
+        }
 
         /// 0 averted, 1 sustained eye contact; null leaves it to the model.
         public void SetGaze(float? target) =>
