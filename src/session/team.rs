@@ -130,12 +130,13 @@ fn gather<'a>(sessions: &'a mut [(&mut Session, f64)]) -> Option<[Option<Block<'
             // A session that shares with nobody leaves no room.
             None => session.room().saturating_sub(rows.unwrap_or(session.room())),
             Some(first) => {
-                let same = first.plan.sampler == plan.sampler
-                    && match (&first.state.maker, &session.state.maker) {
-                        (Maker::Latent(a), Maker::Latent(b)) => a.generator.alike(&b.generator, plan.sampler),
-                        (Maker::Step(_), Maker::Step(_)) => true,
-                        _ => false,
-                    };
+                let same = match (&first.state.maker, &session.state.maker) {
+                    (Maker::Latent(a), Maker::Latent(b)) => {
+                        first.plan.sampler == plan.sampler && a.generator.alike(&b.generator, plan.sampler)
+                    }
+                    (Maker::Step(_), Maker::Step(_)) => true,
+                    _ => false,
+                };
                 match rows.and_then(|rows| left.checked_sub(rows)) {
                     Some(rest) if same && count < MEMBERS => rest,
                     _ => continue,

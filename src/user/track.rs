@@ -125,6 +125,7 @@ impl HeadTrack {
     /// Adds a head position (world, metres, within 1 km) at `time` (session time, seconds), which
     /// is later than all samples that were used and is no other sample's. What does not fit that is
     /// ignored and counted, see [`TrackStats`].
+    #[cfg_attr(not(feature = "internals"), allow(dead_code, reason = "sessions push poses"))]
     pub fn push(&mut self, position: Vec3, time: f64) {
         self.push_pose(position, None, time);
     }
