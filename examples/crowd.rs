@@ -65,7 +65,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let budget = 1000.0 * BLOCK_FRAMES as f64 / f64::from(FPS);
     println!("{}: {agents} agents, {seconds} s of motion, one thread, {}", engine.name(), engine.cpu_level());
     println!("  block of all  p50 {:.2}, p95 {:.2}, max {:.2} ms of {budget:.1} ms", at(0.5), at(0.95), at(1.0));
-    println!("  an agent      {:.3} ms a block, {:.2} % of a core", at(0.5) / agents as f64, at(0.5) / budget / agents as f64 * 100.0);
+    println!(
+        "  an agent      {:.3} ms a block, {:.2} % of a core",
+        at(0.5) / agents as f64,
+        at(0.5) / budget / agents as f64 * 100.0
+    );
     println!("  a core has    {:.0} agents in real time", budget / at(0.5) * agents as f64);
     println!("  state         {:.1} KB an agent, beside its voices", crowd[0].stats().cache_bytes as f64 / 1024.0);
     println!("  shared        {} of {} blocks", team.shared_blocks(), agents * blocks);

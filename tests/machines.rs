@@ -121,7 +121,11 @@ fn motion_has_the_same_bits_on_every_level_of_this_cpu() {
         let expected = motion(&engine(bundle, Kernels::detect().expect("kernels")), rate, options.clone());
         for level in Kernels::available() {
             let kernels = Kernels::with_level(level).expect("an available level");
-            assert_eq!(motion(&engine(bundle, kernels), rate, options.clone()), expected, "{bundle}: {name} on {level:?}");
+            assert_eq!(
+                motion(&engine(bundle, kernels), rate, options.clone()),
+                expected,
+                "{bundle}: {name} on {level:?}"
+            );
         }
     }
 }

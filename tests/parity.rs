@@ -9,8 +9,8 @@ use common::{Golden, dram, dram_in, max_error, tiny};
 use std::collections::BTreeMap;
 use visavis::internals::config::CleanHistory;
 use visavis::internals::kernels::KvDtype;
-use visavis::internals::session::{Anchoring, Diagnostics, HistoryTime, Probe};
 use visavis::internals::kernels::Scheme;
+use visavis::internals::session::{Anchoring, Diagnostics, HistoryTime, Probe};
 use visavis::{BLOCK_FRAMES, Engine, FPS, Sampler, SessionOptions};
 
 const TOLERANCE: f32 = 1e-4;

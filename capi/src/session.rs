@@ -203,6 +203,7 @@ pub unsafe extern "C" fn visavis_session_push_user_head(
 /// in the world, identity where the user faces +Z. Bundles of the kind `dram` see where the face
 /// points and how the head nods; the others make the same motion with and without.
 #[unsafe(no_mangle)]
+#[allow(clippy::too_many_arguments, reason = "numbers of a pose, one by one")]
 pub unsafe extern "C" fn visavis_session_push_user_pose(
     session: *mut VisavisSession,
     x: f32,

@@ -29,7 +29,9 @@ pub(super) fn config(c: &Config) -> Result<()> {
         (Kind::Dram, Some(dram)) => self::dram(c, dram)?,
         (Kind::Sarah, Some(_)) | (Kind::Dram, None) => {
             let kind = c.kind.name();
-            return Err(invalid(format!("the config is of kind `{kind}`, and its networks are not; export the bundle again")));
+            return Err(invalid(format!(
+                "the config is of kind `{kind}`, and its networks are not; export the bundle again"
+            )));
         }
     }
     let bytes = session_bytes(c);

@@ -226,7 +226,9 @@ impl Dram {
         let Work { scratch, x, m, d, delta, rows, .. } = work;
         let mut n = 0;
         let own = self.monadic.inputs();
-        for (Agent { state, voice: features, .. }, x) in members.iter_mut().filter_map(agent).zip(x.chunks_exact_mut(own)) {
+        for (Agent { state, voice: features, .. }, x) in
+            members.iter_mut().filter_map(agent).zip(x.chunks_exact_mut(own))
+        {
             let (p, rest) = x.split_at_mut(size);
             let (e, sound) = rest.split_at_mut(size);
             p.copy_from_slice(&state.p);

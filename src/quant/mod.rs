@@ -91,7 +91,9 @@ pub fn quantise(file: &BundleFile<'_>, options: &Options<'_>) -> Result<Quantise
     if options.calibration.is_some() || options.budget.is_some() {
         // Statistics and sensitivity are measured on latents.
         reference.sarah().map_err(|_| {
-            argument("calibration and budgets are for bundles of the kind `sarah`; leave them out for `dram`".to_owned())
+            argument(
+                "calibration and budgets are for bundles of the kind `sarah`; leave them out for `dram`".to_owned(),
+            )
         })?;
     }
     let calibration = options.calibration.map(|scene| Calibration::new(&reference, scene)).transpose()?;

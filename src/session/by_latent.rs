@@ -140,13 +140,7 @@ impl ByLatent {
     }
 
     /// Takes the latent that the generator made.
-    pub(super) fn take_latent(
-        &mut self,
-        sarah: &Sarah,
-        guard: bool,
-        block: u64,
-        probe: &mut Option<&mut dyn Probe>,
-    ) {
+    pub(super) fn take_latent(&mut self, sarah: &Sarah, guard: bool, block: u64, probe: &mut Option<&mut dyn Probe>) {
         self.z.values_mut().copy_from_slice(self.generator.last_latent().values());
         tell(probe, block, "latents", self.z.values());
         let usable = !guard || self.z.values().iter().all(|z| z.abs() < MAX_LATENT);

@@ -3,8 +3,8 @@
 //! and of the flow model alone; nothing of it is public.
 
 use super::Session;
-use super::options::SessionOptions;
 use super::maker::Maker;
+use super::options::SessionOptions;
 use super::state::BlockState;
 use super::tools::{Kit, Tools};
 use crate::engine::Engine;

@@ -24,7 +24,8 @@ impl Session {
     }
 
     pub(super) fn apply_gaze(&mut self, target: Option<f32>) {
-        if let Some(maker) = self.state.maker.latent().filter(|_| self.options.diagnostics.gaze_control.guides(target)) {
+        if let Some(maker) = self.state.maker.latent().filter(|_| self.options.diagnostics.gaze_control.guides(target))
+        {
             maker.generator.open_gaze();
         }
         self.options.gaze = target;

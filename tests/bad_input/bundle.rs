@@ -286,7 +286,9 @@ fn featherweight_bundles_are_checked_as_strictly() {
     refuse("tcn", BundleInvalid, "dilations is 5000", &set("/dram/monadic/dilations", serde_json::json!([1, 2, 5000])));
     refuse("tcn", BundleInvalid, "unknown field", &|parts| parts.config["dram"]["monadic"]["layers"] = 3.into());
     refuse("lstm", BundleInvalid, "layers is 99", &set("/dram/dyadic/layers", 99.into()));
-    changed(BundleInvalid, "its networks are not", |parts| parts.config["dram"] = Parts::dram("tcn").config["dram"].clone());
+    changed(BundleInvalid, "its networks are not", |parts| {
+        parts.config["dram"] = Parts::dram("tcn").config["dram"].clone()
+    });
 }
 
 /// Predictors whose numbers run away: the guard answers, and what comes out stays finite.

@@ -138,9 +138,7 @@ fn networks(c: &Config, f: &mut fmt::Formatter<'_>) -> fmt::Result {
             g.levels.iter().copied().fold(f32::NEG_INFINITY, f32::max),
             g.seconds
         )?,
-        None => {
-            writeln!(f, "  gaze     not calibrated: targets are values of the gaze channel (`visavis calibrate`)")?
-        }
+        None => writeln!(f, "  gaze     not calibrated: targets are values of the gaze channel (`visavis calibrate`)")?,
     }
     Ok(())
 }

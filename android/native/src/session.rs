@@ -207,13 +207,7 @@ fn push_pose<'l>(
 
 /// Writes how much each joint follows the user in the last block's frames; returns how many numbers
 /// those are, 0 where the bundle has no such read-out.
-fn dyadic<'l>(
-    env: &mut Env<'l>,
-    _: JClass<'l>,
-    session: jlong,
-    out: JFloatArray<'l>,
-    offset: jint,
-) -> Outcome<jint> {
+fn dyadic<'l>(env: &mut Env<'l>, _: JClass<'l>, session: jlong, out: JFloatArray<'l>, offset: jint) -> Outcome<jint> {
     if out.is_null() {
         return Err(jni::errors::Error::NullPtr("out is null").into());
     }

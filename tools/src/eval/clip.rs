@@ -43,8 +43,7 @@ enum Data {
     Memory(Arc<Segment>),
 }
 
-const TENSORS: [&str; 6] =
-    ["positions", "rotations", "user_head", "agent_voice", "user_voice", "user_head_rotation"];
+const TENSORS: [&str; 6] = ["positions", "rotations", "user_head", "agent_voice", "user_voice", "user_head_rotation"];
 
 /// Some seconds of a clip.
 #[derive(Debug, Clone)]

@@ -37,7 +37,8 @@ pub(super) fn in_window(engine: &Arc<Engine>, options: &SessionOptions, window: 
     let Segment { frames, user, user_rotation, .. } = &window.segment;
     let options = SessionOptions { start: frames[0].root, ..options.clone() };
     let voices = [window.segment.agent(), window.segment.user()];
-    let mut motion = generate(engine, options, voices, user.iter().copied(), user_rotation.as_deref())?.recording.frames;
+    let mut motion =
+        generate(engine, options, voices, user.iter().copied(), user_rotation.as_deref())?.recording.frames;
     motion.truncate(frames.len());
     Ok(motion.split_off(LEAD))
 }

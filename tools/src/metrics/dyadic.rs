@@ -37,7 +37,13 @@ impl Dyadic {
             mean: mean(body.iter().copied())?,
             user_speaking: under(true),
             user_silent: under(false),
-            joints: recording.rig.joints.iter().enumerate().map(|(j, joint_)| (joint_.name.clone(), joint(j))).collect(),
+            joints: recording
+                .rig
+                .joints
+                .iter()
+                .enumerate()
+                .map(|(j, joint_)| (joint_.name.clone(), joint(j)))
+                .collect(),
         })
     }
 }
@@ -55,7 +61,17 @@ mod tests {
         r.user_voice = Some((0..60 * 800).map(|i| if i < 24_000 { (i as f32).sin() } else { 0.0 }).collect());
         let speech = speech_frames(r.user_voice.as_deref().unwrap(), 60);
         for (frame, speaks) in r.frames.iter_mut().zip(&speech) {
-            frame.dyadic = (0..joints).map(|j| if j == 0 { 1.0 } else if *speaks { 0.5 } else { 0.0 }).collect();
+            frame.dyadic = (0..joints)
+                .map(|j| {
+                    if j == 0 {
+                        1.0
+                    } else if *speaks {
+                        0.5
+                    } else {
+                        0.0
+                    }
+                })
+                .collect();
         }
         let dyadic = Dyadic::of(&r).unwrap();
         let others = (joints - 1) as f64;

@@ -1,7 +1,7 @@
 //! All metrics that need no ground truth, for `metrics.json`.
 
-use super::*;
 use super::dyadic::Dyadic;
+use super::*;
 use crate::recording::Recording;
 use serde::Serialize;
 
