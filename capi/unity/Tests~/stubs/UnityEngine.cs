@@ -42,6 +42,7 @@ namespace UnityEngine
 
     public class Transform : Component
     {
+        public Quaternion rotation { get; set; }
         public Vector3 position { get; set; }
         public Vector3 localPosition { get; set; }
         public Quaternion localRotation { get; set; }
@@ -62,6 +63,8 @@ namespace UnityEngine
     {
         public float x, y, z, w;
         public Quaternion(float x, float y, float z, float w) { this.x = x; this.y = y; this.z = z; this.w = w; }
+        public static Quaternion operator *(Quaternion a, Quaternion b) => a;
+        public static Quaternion Inverse(Quaternion rotation) => rotation;
     }
 
     public struct Rect
