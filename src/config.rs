@@ -4,6 +4,10 @@
 //! Stored as JSON under the key `visavis` of the safetensors metadata; written by
 //! `training/visavis_train/export.py`.
 
+mod dram;
+
+pub use dram::{DramBundle, DramConfig, LstmConfig, TcnConfig};
+
 use crate::rig::Rig;
 use crate::scheme::Scheme;
 use serde::{Deserialize, Serialize};
@@ -12,11 +16,39 @@ use std::collections::BTreeMap;
 /// The format version that this build reads and writes.
 pub const FORMAT: u32 = 1;
 
-/// Configuration of a bundle.
+/// Which generator a bundle is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// The flow model; bundles that do not say are of this kind.
+    #[default]
+    Sarah,
+    /// Dyadic residual attention, the featherweight tier.
+    Dram,
+}
+
+impl Kind {
+    /// As bundles spell it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Sarah => "sarah",
+            Self::Dram => "dram",
+        }
+    }
+
+    fn is_sarah(&self) -> bool {
+        *self == Self::Sarah
+    }
+}
+
+/// Configuration of a bundle. Sections that its kind does not have are empty: sizes 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Config {
     /// Format version, [`FORMAT`].
     pub format: u32,
+    /// The generator.
+    #[serde(default, skip_serializing_if = "Kind::is_sarah")]
+    pub kind: Kind,
     /// Name of the model.
     pub name: String,
     /// One or two sentences: what it was trained on and for.
@@ -30,16 +62,22 @@ pub struct Config {
     pub agent_delay_blocks: u32,
     /// The skeleton.
     pub rig: Rig,
-    /// Pose representation.
+    /// Pose representation; none (radius 0) for `dram`.
+    #[serde(skip_serializing_if = "PoseConfig::is_empty")]
     pub pose: PoseConfig,
     /// Audio encoder.
     pub audio: AudioConfig,
-    /// Variational autoencoder of motion.
+    /// Variational autoencoder of motion; none (sizes 0) for `dram`.
+    #[serde(skip_serializing_if = "VaeConfig::is_empty")]
     pub vae: VaeConfig,
-    /// Flow transformer.
+    /// Flow transformer; none (sizes 0) for `dram`.
+    #[serde(skip_serializing_if = "FlowConfig::is_empty")]
     pub flow: FlowConfig,
     /// Single-step student, when the bundle holds one.
     pub student: Option<StudentConfig>,
+    /// Predictors of the kind `dram`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dram: Option<DramConfig>,
     /// Defaults for sessions.
     pub session: SessionConfig,
     /// What the gaze channel does to this model's gaze, as `visavis calibrate` measured it; none:
@@ -61,10 +99,16 @@ pub struct Quantisation {
 }
 
 /// Pose representation.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct PoseConfig {
     /// Circumradius of the icosahedra, metres.
     pub radius: f32,
+}
+
+impl PoseConfig {
+    fn is_empty(&self) -> bool {
+        self.radius == 0.0
+    }
 }
 
 /// Audio encoder: a stack of causal convolutions over 24 kHz mono, one feature vector per frame.
@@ -92,7 +136,7 @@ pub struct ConvConfig {
 }
 
 /// Variational autoencoder of motion.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct VaeConfig {
     /// Transformer layers of the encoder and of the decoder, each.
     pub layers: usize,
@@ -109,7 +153,7 @@ pub struct VaeConfig {
 }
 
 /// Flow transformer.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct FlowConfig {
     /// Transformer layers.
     pub layers: usize,
@@ -133,6 +177,18 @@ pub struct FlowConfig {
     pub embed_gaze: usize,
     /// User positions are divided by this before they are embedded, metres.
     pub user_scale: f32,
+}
+
+impl VaeConfig {
+    fn is_empty(&self) -> bool {
+        self.layers == 0
+    }
+}
+
+impl FlowConfig {
+    fn is_empty(&self) -> bool {
+        self.layers == 0
+    }
 }
 
 /// Single-step student.

@@ -1,27 +1,27 @@
 //! The engine: a loaded bundle, immutable, shared by any number of sessions.
 
+mod model;
 #[cfg(feature = "internals")]
 mod round_trip;
 
+pub(crate) use model::{Model, Sarah};
+
 use crate::audio::{AudioEncoder, AudioWeights};
-use crate::bundle::{AudioSource, BundleFile, IDLE_FRAMES, IDLE_LATENTS, LoadMode, Tensors};
+use crate::bundle::{AudioSource, BundleFile, LoadMode, Tensors};
 use crate::config::Config;
+use crate::dram::Dram;
 use crate::error::{Error, ErrorKind, Result};
-use crate::flow::{ConditionLayout, FlowNet, Nets, reference_times, student_times};
-use crate::frame::{BLOCK_FRAMES, Sampler, feature_count};
-use crate::kernels::{Exec, Kernels, KvDtype};
-use crate::normaliser::{Metric, Normaliser, Standardised};
+use crate::flow::ConditionLayout;
+use crate::frame::{BLOCK_FRAMES, Sampler};
+use crate::kernels::{Exec, Kernels};
 use crate::rig::Rig;
-use crate::vae::{Decoder, Encoder};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Most frames of an idle clip: every session starts by going through them.
-const MAX_IDLE_FRAMES: usize = 3600;
-
 /// Which networks of a bundle an engine holds.
 ///
-/// What no session will use need not take memory, nor time to load.
+/// What no session will use need not take memory, nor time to load. Bundles of the kind `dram` are
+/// always loaded whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Networks {
     /// The network of the samplers with steps: midpoint and Euler. Without it sessions need
@@ -68,14 +68,7 @@ pub struct Engine {
     pub(crate) audio: AudioWeights,
     #[cfg(feature = "tract")]
     pub(crate) audio_source: AudioSource,
-    pub(crate) encoder: Option<Encoder>,
-    pub(crate) decoder: Decoder,
-    pub(crate) flow: Option<FlowNet>,
-    pub(crate) student: Option<FlowNet>,
-    pub(crate) pose: Normaliser,
-    pub(crate) latent: Normaliser,
-    /// Latents of the idle clip, `[blocks, latent]`.
-    pub(crate) idle: Standardised,
+    pub(crate) model: Model,
 }
 
 impl Engine {
@@ -179,83 +172,48 @@ impl Engine {
     }
 
     fn build(config: Config, t: &Tensors<'_>, kernels: Kernels, networks: Networks) -> Result<Self> {
-        let some = networks.reference || networks.student && config.student.is_some();
-        if !some {
-            let message =
-                "no network to make motion with: load the reference network, or the student of a bundle that has one";
-            return Err(Error::new(ErrorKind::Argument, message));
-        }
-        let features = feature_count(config.rig.joints.len());
-        let latent = config.vae.latent;
-        let layout = ConditionLayout { audio_features: config.audio.features };
-        let idle = Idle::read(t, features, latent)?;
-        let net = |prefix: &str, wanted: bool, times: Vec<f32>| {
-            if !wanted {
-                t.skip(&format!("{prefix}."));
-                return Ok(None);
-            }
-            let times = (!networks.modulation).then_some(times.as_slice());
-            FlowNet::load(t, kernels, &config.flow, latent, layout, prefix, times).map(Some)
-        };
-        // Tensors of a student that the config does not have are not skipped: they are an error.
-        let student = config.student.map(|s| net("student", networks.student, student_times(s.tau_history)));
-        let student = student.transpose()?.flatten();
-        let flow_times = reference_times(Sampler::Midpoint4, config.session.clean_history);
-        let flow = net("flow", networks.reference, flow_times)?;
         let audio_source = AudioSource::load(t, &config.audio)?;
-        let encoder = match idle {
-            Idle::Latents(_) if !networks.encoder => {
-                t.skip("vae.encoder.");
-                None
+        let mut exec = exec(&config, kernels, 1)?;
+        let model = match &config.dram {
+            None => Model::Sarah(Box::new(Sarah::load(t, kernels, &mut exec, &config, networks)?)),
+            Some(dram) => {
+                let dram = Dram::load(t, kernels, &mut exec, dram, &config.rig, config.audio.features)?;
+                Model::Dram(Box::new(dram))
             }
-            _ => Some(Encoder::load(t, kernels, &config.vae, features)?),
         };
-        let mut engine = Self {
+        let engine = Self {
             audio: audio_source.pack(kernels, &config.audio)?,
-            encoder: None,
-            decoder: Decoder::load(t, kernels, &config.vae, features)?,
-            flow,
-            student,
-            pose: normaliser(t, "stats.pose", features)?,
-            latent: normaliser(t, "stats.latent", latent)?,
-            idle: Standardised::default(),
+            model,
             #[cfg(feature = "tract")]
             audio_source,
             kernels,
             config,
         };
         t.finish()?;
-        engine.idle = match (idle, &encoder) {
-            (Idle::Latents(latents), _) => latents,
-            (Idle::Frames(frames), Some(encoder)) => engine.encode(encoder, frames.view())?,
-            (Idle::Frames(_), None) => Standardised::default(),
-        };
-        engine.encoder = encoder.filter(|_| networks.encoder);
         Ok(engine)
     }
 
-    /// Latents `[n / 4, latent]` of `n` consecutive feature vectors.
-    fn encode(&self, encoder: &Encoder, frames: Metric<&[f32]>) -> Result<Standardised> {
-        let (features, latent) = (self.features(), self.latent.width());
-        let blocks = frames.values().len() / (BLOCK_FRAMES * features);
-        let mut exec = self.exec(1)?;
-        let (mut state, mut work) = (encoder.state(KvDtype::F32), self.decoder.work(1));
-        let (mut block, mut z) = (Standardised::zeros(BLOCK_FRAMES * features), Metric::zeros(latent));
-        let mut latents = Standardised::zeros(blocks * latent);
-        exec.begin();
-        for i in 0..blocks {
-            self.pose.standardise(frames.part(i..i + 1, BLOCK_FRAMES * features), block.view_mut());
-            encoder.step(&mut exec, &mut work, &mut state, block.view(), z.view_mut());
-            self.latent.standardise(z.view(), latents.part_mut(i..i + 1, latent));
+    /// The networks of the kind `sarah`, for what other kinds do not have.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] for a bundle of another kind.
+    pub(crate) fn sarah(&self) -> Result<&Sarah> {
+        match &self.model {
+            Model::Sarah(sarah) => Ok(sarah),
+            Model::Dram(_) => Err(Error::new(
+                ErrorKind::Argument,
+                "a bundle of the kind `dram` has no latents, samplers or calibration; this needs one of the kind `sarah`",
+            )),
         }
-        exec.end();
-        Ok(latents)
     }
 
-    /// The networks that make latents.
-    pub(crate) fn nets(&self) -> Nets<'_> {
-        let student = self.student.as_ref().zip(self.config.student.map(|s| s.tau_history));
-        Nets { reference: self.flow.as_ref(), student }
+    /// Fails where there is no flow model.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] for a bundle of another kind than `sarah`.
+    #[doc(hidden)]
+    pub fn needs_sarah(&self) -> Result<()> {
+        self.sarah().map(drop)
     }
 
     /// The model's name, as its bundle tells it.
@@ -275,7 +233,13 @@ impl Engine {
 
     /// Whether the single-step student was loaded, which [`Sampler::Single`] needs.
     pub fn has_student(&self) -> bool {
-        self.student.is_some()
+        self.sarah().is_ok_and(|sarah| sarah.student.is_some())
+    }
+
+    /// The generator that the bundle is for, as it spells it: `sarah`, the flow model, or `dram`, the
+    /// featherweight tier.
+    pub fn kind(&self) -> &'static str {
+        self.config.kind.name()
     }
 
     /// The CPU level that the weights are packed for, as `VISAVIS_CPU` names it: `avx512`,
@@ -296,31 +260,30 @@ impl Engine {
         self.kernels
     }
 
-    /// Blocks of the idle clip, which are the first tokens of every session.
+    /// Blocks of the idle clip, which are the first tokens of every session; 0 without tokens.
     #[doc(hidden)]
     pub fn idle_blocks(&self) -> usize {
-        self.idle.values().len() / self.latent.width()
+        self.sarah().map_or(0, Sarah::idle_blocks)
     }
 
     /// Bytes of all packed weights.
     pub fn weight_bytes(&self) -> usize {
-        let net = |n: &FlowNet| n.pass_bytes() + n.condition_bytes() + n.modulation_bytes();
-        let flows: usize = self.flow.iter().chain(&self.student).map(net).sum();
-        flows + self.encoder.as_ref().map_or(0, Encoder::bytes) + self.decoder.bytes() + self.audio.bytes()
+        self.audio.bytes()
+            + match &self.model {
+                Model::Sarah(sarah) => sarah.bytes(),
+                Model::Dram(dram) => dram.bytes(),
+            }
     }
 
     /// Bytes of packed weights that a block with `sampler` reads: the flow once per evaluation, the
-    /// decoder once, the audio encoder once per voice. Re-anchoring and slots that catch up come on
-    /// top.
+    /// decoder once, the audio encoder once per voice; of the kind `dram`, the predictors once per
+    /// frame. Re-anchoring and slots that catch up come on top.
     pub fn block_bytes(&self, sampler: Sampler) -> usize {
-        let nets = self.nets();
-        let (pass, condition) = nets.of(sampler).map_or((0, 0), |net| (net.pass_bytes(), net.condition_bytes()));
-        sampler.evaluations() * pass + condition + self.decoder.bytes() + 2 * self.audio.bytes()
-    }
-
-    /// Width of a pose feature vector.
-    pub(crate) fn features(&self) -> usize {
-        self.pose.width()
+        2 * self.audio.bytes()
+            + match &self.model {
+                Model::Sarah(sarah) => sarah.block_bytes(sampler),
+                Model::Dram(dram) => BLOCK_FRAMES * dram.bytes(),
+            }
     }
 
     /// Conditioning layout of the flow networks.
@@ -330,55 +293,26 @@ impl Engine {
 
     /// An executor with scratch for the widest operation of any of the networks.
     pub(crate) fn exec(&self, threads: usize) -> Result<Exec> {
-        let c = &self.config;
-        let audio = AudioEncoder::width(&c.audio);
-        let flow =
-            [c.flow.width * c.flow.mlp.max(6), c.flow.embed_user + 2 * c.flow.embed_voice + c.flow.embed_gaze + 4];
-        let rest =
-            [c.vae.width * c.vae.mlp.max(3), self.features(), 4 * c.audio.features, c.vae.latent, c.flow.tau_width];
-        let width = flow.into_iter().chain(rest).fold(audio, usize::max);
-        // Voices are what is shared out whole.
-        Exec::new(self.kernels, threads, width)?.with_workers(audio)
+        exec(&self.config, self.kernels, threads)
     }
 }
 
-/// The idle clip, as bundles hold it: exported ones its frames, quantised ones the latents that the
-/// encoder made of them.
-enum Idle {
-    /// Pose features in metres, `[4 blocks, features]`.
-    Frames(Metric),
-    /// Latents, `[blocks, latent]`.
-    Latents(Standardised),
-}
-
-impl Idle {
-    fn read(t: &Tensors<'_>, features: usize, latent: usize) -> Result<Self> {
-        let invalid = |message| Err(Error::new(ErrorKind::BundleInvalid, message));
-        if t.has(IDLE_LATENTS) {
-            let most = MAX_IDLE_FRAMES / BLOCK_FRAMES;
-            return match t.f32_rows(IDLE_LATENTS, latent)? {
-                (blocks, _) if blocks > most => {
-                    invalid(format!("tensor {IDLE_LATENTS} has {blocks} blocks, not up to {most}"))
-                }
-                (_, latents) => Ok(Self::Latents(Standardised::new(latents))),
-            };
-        }
-        match t.f32_rows(IDLE_FRAMES, features)? {
-            (frames, _) if frames % BLOCK_FRAMES != 0 || frames > MAX_IDLE_FRAMES => invalid(format!(
-                "tensor {IDLE_FRAMES} has {frames} frames, not a multiple of {BLOCK_FRAMES} up to {MAX_IDLE_FRAMES}"
-            )),
-            (_, features) => Ok(Self::Frames(Metric::new(features))),
-        }
-    }
-}
-
-fn normaliser(t: &Tensors<'_>, name: &str, width: usize) -> Result<Normaliser> {
-    Normaliser::new(name, t.f32(&format!("{name}_mean"), &[width])?, t.f32(&format!("{name}_std"), &[width])?)
+/// An executor for all networks of `config`.
+fn exec(config: &Config, kernels: Kernels, threads: usize) -> Result<Exec> {
+    let audio = AudioEncoder::width(&config.audio);
+    let (features, joints) = (config.audio.features, config.rig.len());
+    let width = match &config.dram {
+        None => model::widest(config),
+        Some(dram) => Dram::widest_of(dram, joints, features),
+    };
+    // Voices are what is shared out whole.
+    Exec::new(kernels, threads, width.max(audio))?.with_workers(audio)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::normaliser::{Metric, Standardised};
     use safetensors::SafeTensors;
 
     fn golden(name: &str) -> Vec<f32> {
@@ -395,15 +329,17 @@ mod tests {
         let engine = Engine::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/goldens/tiny.safetensors")).unwrap();
         let mu = Metric::new(golden("encoder.mu"));
         let mut expected = Standardised::zeros(mu.values().len());
-        engine.latent.standardise(mu.view(), expected.view_mut());
+        engine.sarah().unwrap().latent.standardise(mu.view(), expected.view_mut());
         let frames = Metric::new(golden("encoder.frames"));
-        let latents = engine.encode(engine.encoder().unwrap(), frames.view()).unwrap();
+        let sarah = engine.sarah().unwrap();
+        let mut exec = engine.exec(1).unwrap();
+        let latents = sarah.encode(&mut exec, engine.encoder().unwrap(), frames.view());
         let (latents, expected) = (latents.values(), expected.values());
         assert_eq!(latents.len(), expected.len());
         let error = latents.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(error < 1e-4, "{error}");
         let idle =
-            engine.idle.values().iter().zip(golden("idle.latents")).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            sarah.idle.values().iter().zip(golden("idle.latents")).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(idle < 1e-4, "{idle}");
     }
 }

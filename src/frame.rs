@@ -104,11 +104,15 @@ pub struct Frame {
     pub fit_error: f32,
     /// Gaze score in this frame, -1 to 1, or `None` while the user's position is not known.
     pub gaze: Option<f32>,
-    /// What made this frame.
+    /// What made this frame; of bundles without samplers the one that was set.
     pub sampler: Sampler,
     /// How much of the frame is a held pose instead of the model's, 0 to 1: while the model cannot
     /// keep up, or gave what no body can do, and in the cross-fade after that.
     pub held: f32,
+    /// How much each joint follows the user rather than the agent's own voice and habit, 0 to 1,
+    /// joints as in the rig: the read-out of bundles of the kind `dram`; empty for others, and
+    /// zeros while a pose is held instead of computed.
+    pub dyadic: Vec<f32>,
 }
 
 impl Frame {
@@ -125,6 +129,7 @@ impl Frame {
             gaze: None,
             sampler: Sampler::Midpoint4,
             held: 0.0,
+            dyadic: Vec::new(),
         }
     }
 }

@@ -21,6 +21,7 @@ mod bounded;
 mod bundle;
 mod clock;
 mod config;
+mod dram;
 mod engine;
 mod error;
 mod flow;
@@ -86,7 +87,7 @@ pub mod internals {
         ($($room:ident)*) => { $(pub mod $room { pub use crate::$room::*; })* };
     }
 
-    rooms!(audio bounded bundle config engine flow frame kernels nn normaliser par pose session user vae);
+    rooms!(audio bounded bundle config dram engine flow frame kernels nn normaliser par pose session user vae);
     #[cfg(feature = "quant")]
     rooms!(quant);
 }

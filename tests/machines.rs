@@ -16,6 +16,8 @@ use visavis::internals::session::{Anchoring, Diagnostics};
 use visavis::{BundleFile, Engine, Frame, Sampler, SessionOptions};
 
 const BLOCKS: usize = 24;
+const TINY: &str = "tiny.safetensors";
+const DRAM: [(&str, &str); 2] = [("tcn", "dram-tcn.safetensors"), ("lstm", "dram-lstm.safetensors")];
 
 /// FNV-1a, 64 bits.
 struct Digest(u64);
@@ -45,6 +47,7 @@ impl Digest {
         self.floats(&f.hips.to_array());
         f.local.iter().for_each(|q| self.floats(&q.to_array()));
         self.floats(&[f.fit_error, f.gaze.unwrap_or(f32::MAX)]);
+        self.floats(&f.dyadic);
     }
 }
 
@@ -72,8 +75,8 @@ fn cases() -> Vec<(&'static str, u32, SessionOptions)> {
     ]
 }
 
-fn engine(kernels: Kernels) -> std::sync::Arc<Engine> {
-    let bundle = BundleFile::open(golden_path("tiny.safetensors")).expect("the tiny bundle");
+fn engine(name: &str, kernels: Kernels) -> std::sync::Arc<Engine> {
+    let bundle = BundleFile::open(golden_path(name)).expect("the tiny bundle");
     Engine::from_file(&bundle, kernels).expect("it loads")
 }
 
@@ -89,7 +92,7 @@ fn motion(engine: &std::sync::Arc<Engine>, rate: u32, options: SessionOptions) -
 fn motion_has_the_same_bits_on_every_machine() {
     let mut lines =
         String::from("# What tests/machines.rs computes on every machine; VISAVIS_DIGESTS=write rewrites it.\n");
-    let tiny = engine(Kernels::detect().expect("kernels"));
+    let tiny = engine(TINY, Kernels::detect().expect("kernels"));
     for rate in [8_000, 11_025, 16_000, 22_050, 32_000, 44_100, 48_000, 96_000, 192_000] {
         let mut digest = Digest::new();
         digest.floats(&resample_to_24k(&Inputs::circling(1.0, rate).agent, rate).expect("resampled"));
@@ -97,6 +100,11 @@ fn motion_has_the_same_bits_on_every_machine() {
     }
     for (name, rate, options) in cases() {
         writeln!(lines, "{:016x}  {name}", motion(&tiny, rate, options)).expect("a string");
+    }
+    for (backbone, name) in DRAM {
+        let dram = engine(name, Kernels::detect().expect("kernels"));
+        let options = SessionOptions { gaze: Some(0.8), threads: 2, ..Default::default() };
+        writeln!(lines, "{:016x}  dram, {backbone}, two threads", motion(&dram, 48_000, options)).expect("a string");
     }
     let path = golden_path("digests.txt");
     if std::env::var("VISAVIS_DIGESTS").is_ok_and(|v| v == "write") {
@@ -109,9 +117,15 @@ fn motion_has_the_same_bits_on_every_machine() {
 #[test]
 fn motion_has_the_same_bits_on_every_level_of_this_cpu() {
     let (name, rate, options) = cases().swap_remove(1);
-    let expected = motion(&engine(Kernels::detect().expect("kernels")), rate, options.clone());
-    for level in Kernels::available() {
-        let kernels = Kernels::with_level(level).expect("an available level");
-        assert_eq!(motion(&engine(kernels), rate, options.clone()), expected, "{name} on {level:?}");
+    for bundle in [TINY, DRAM[0].1, DRAM[1].1] {
+        let expected = motion(&engine(bundle, Kernels::detect().expect("kernels")), rate, options.clone());
+        for level in Kernels::available() {
+            let kernels = Kernels::with_level(level).expect("an available level");
+            assert_eq!(
+                motion(&engine(bundle, kernels), rate, options.clone()),
+                expected,
+                "{bundle}: {name} on {level:?}"
+            );
+        }
     }
 }

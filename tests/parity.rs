@@ -5,12 +5,13 @@
 
 mod common;
 
-use common::{Golden, max_error, tiny};
+use common::{Golden, dram, dram_in, max_error, tiny};
 use std::collections::BTreeMap;
 use visavis::internals::config::CleanHistory;
 use visavis::internals::kernels::KvDtype;
+use visavis::internals::kernels::Scheme;
 use visavis::internals::session::{Anchoring, Diagnostics, HistoryTime, Probe};
-use visavis::{FPS, Sampler, SessionOptions};
+use visavis::{BLOCK_FRAMES, Engine, FPS, Sampler, SessionOptions};
 
 const TOLERANCE: f32 = 1e-4;
 
@@ -125,4 +126,88 @@ fn fp16_cache_stays_close() {
     println!("fp16 cache: {error:e}");
     assert!(error > 0.0, "the cache is stored in fp16");
     assert!(error < 2e-2, "latents differ by {error}");
+}
+
+/// What a session of the featherweight tier is told of a golden file's inputs.
+#[derive(Clone, Copy)]
+struct Told {
+    voices: bool,
+    head: bool,
+    rotation: bool,
+    gaze: bool,
+}
+
+const EVERYTHING: Told = Told { voices: true, head: true, rotation: true, gaze: true };
+
+/// Runs a golden file's inputs through a session of the featherweight tier.
+fn steps(engine: &std::sync::Arc<Engine>, golden: &Golden, told: Told) -> BTreeMap<&'static str, Vec<f32>> {
+    let gaze = told.gaze.then(|| golden.values("gaze")[0]);
+    let diagnostics = Diagnostics { bridge: false, ..Default::default() };
+    let options = SessionOptions { gaze, stance: false, guard: false, diagnostics, ..Default::default() };
+    let mut session = engine.session(options).expect("session");
+    if told.voices {
+        session.push_agent_audio(&golden.values("agent_voice"), 24_000).expect("agent voice");
+        session.push_user_audio(&golden.values("user_voice"), 24_000).expect("user voice");
+    }
+    let (path, rotations) = (golden.values("user_path"), golden.values("user_rotation"));
+    for (i, (p, r)) in path.chunks_exact(3).zip(rotations.chunks_exact(4)).enumerate().filter(|_| told.head) {
+        let rotation = told.rotation.then(|| glam::Quat::from_slice(r));
+        session.push_user_pose(glam::Vec3::from_slice(p), rotation, i as f64 / f64::from(FPS)).expect("head");
+    }
+    let mut stages = Stages::default();
+    for _ in 0..golden.get("user_path").0[0] / BLOCK_FRAMES {
+        let now = session.next_due();
+        let frames = session.poll_with(now, Some(&mut stages)).expect("poll").expect("due");
+        assert!(frames.iter().all(|frame| frame.dyadic.len() == frame.global.len()));
+    }
+    stages.0
+}
+
+#[test]
+fn every_step_of_the_featherweight_tier_equals_pytorch() {
+    for backbone in ["tcn", "lstm"] {
+        let (engine, golden) = (dram(backbone), Golden::named(&format!("dram-{backbone}.out.safetensors")));
+        let ours = steps(&engine, &golden, EVERYTHING);
+        for name in ["agent_features", "user_rows", "m", "d", "delta", "poses", "dyadic", "roots", "positions"] {
+            let error = max_error(&ours[name], &golden.values(name));
+            println!("{backbone}, {name}: {error:e}");
+            assert!(error < TOLERANCE, "{backbone}: {name} differs by {error}");
+        }
+        for (a, b) in ours["rotations"].chunks_exact(4).zip(golden.values("rotations").chunks_exact(4)) {
+            let dot: f32 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+            assert!(dot.abs() > 1.0 - 1e-6, "{backbone}: rotation {a:?} is not {b:?}");
+        }
+        let nothing = Told { voices: false, head: false, rotation: false, gaze: false };
+        let position = Told { rotation: false, gaze: false, ..EVERYTHING };
+        let full = golden.values("poses");
+        for (told, name) in [(nothing, "absent.poses"), (position, "position.poses")] {
+            let (ours, golden) = (steps(&engine, &golden, told), golden.values(name));
+            let error = max_error(&ours["poses"], &golden);
+            println!("{backbone}, {name}: {error:e}");
+            assert!(error < TOLERANCE, "{backbone}: {name} differs by {error}");
+            assert!(max_error(&golden, &full) > 1e-3, "{backbone}: what is told changes the motion");
+        }
+    }
+}
+
+/// The first step alone: what integers make of one forecast, before it feeds on itself.
+#[test]
+fn quantised_steps_stay_close() {
+    for (backbone, scheme, most) in
+        ["tcn", "lstm"].into_iter().flat_map(|b| [(b, Scheme::F16, 1e-2), (b, Scheme::I8, 5e-2)])
+    {
+        let golden = Golden::named(&format!("dram-{backbone}.out.safetensors"));
+        let ours = steps(&dram_in(backbone, scheme), &golden, EVERYTHING);
+        for name in ["m", "d", "delta"] {
+            let golden = golden.values(name);
+            let size = golden.len() / golden_frames(&ours);
+            let error = max_error(&ours[name][..size], &golden[..size]);
+            println!("{backbone} {scheme}, {name}: {error:e}");
+            assert!(error < most, "{backbone} {scheme}: {name} differs by {error}");
+        }
+    }
+}
+
+fn golden_frames(ours: &BTreeMap<&'static str, Vec<f32>>) -> usize {
+    ours["roots"].len() / 3
 }

@@ -5,8 +5,8 @@
 
 mod common;
 
-use common::{Inputs, tiny, tiny_in};
-use glam::Vec3;
+use common::{Inputs, dram, dram_in, tiny, tiny_in};
+use glam::{Quat, Vec3};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -122,7 +122,8 @@ impl Beside {
 fn a_running_session_does_not_allocate() {
     assert!(allocations(|| drop(std::hint::black_box(vec![1u8]))) > 0, "the allocator counts");
     let inputs = Inputs::circling(20.0, 48_000);
-    let engines = [tiny(), tiny_in(Scheme::F16), tiny_in(Scheme::I8), tiny_in(Scheme::I4)];
+    let flow = [tiny(), tiny_in(Scheme::F16), tiny_in(Scheme::I8), tiny_in(Scheme::I4)];
+    let engines: Vec<_> = flow.into_iter().chain([dram("lstm"), dram_in("tcn", Scheme::I8)]).collect();
     for (engine, threads) in engines.iter().flat_map(|e| [(e, 1), (e, 2)]) {
         let options = SessionOptions { threads, diagnostics: Anchoring::Every(10).into(), ..Default::default() };
         let mut session = engine.session(options).unwrap();
@@ -140,7 +141,7 @@ fn a_running_session_does_not_allocate() {
                 session.set_gaze((block % 5 > 1).then_some(0.5)).unwrap();
                 let now = session.next_due();
                 while let Some((time, position)) = path.next_if(|(time, _)| *time <= now) {
-                    session.push_user_head(*position, *time).unwrap();
+                    session.push_user_pose(*position, (block > 50).then_some(Quat::IDENTITY), *time).unwrap();
                 }
                 if let (Some(a), Some(u)) = (agent.next(), user.next()) {
                     session.push_agent_audio(a, inputs.rate).unwrap();
@@ -150,7 +151,8 @@ fn a_running_session_does_not_allocate() {
             }
         });
         assert_eq!(calls, 0, "allocations with {threads} threads");
-        assert!(session.stats().anchorings > 0, "re-anchoring was among what ran");
+        let flow = engine.kind() == "sarah";
+        assert!(!flow || session.stats().anchorings > 0, "re-anchoring was among what ran");
 
         let beside = Beside::start(&session);
         let calls = allocations(|| {
@@ -186,7 +188,7 @@ fn a_running_session_does_not_allocate() {
         });
         assert_eq!(calls, 0, "allocations under the governor with {threads} threads");
         let stats = session.stats().governor;
-        assert!(stats.held_blocks > 0 && stats.catch_up_passes > 0, "{stats:?}");
+        assert!(stats.held_blocks > 0 && (!flow || stats.catch_up_passes > 0), "{stats:?}");
     }
     // Sessions stepped together, some of which share passes.
     for (engine, threads) in engines.iter().flat_map(|e| [(e, 1), (e, 2)]) {

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Inputs, motion, poll_blocks, run, tiny};
+use common::{Inputs, dram, motion, motion_of, poll_blocks, run, tiny};
 use glam::Vec3;
 use visavis::internals::session::{Diagnostics, Probe};
 use visavis::{BLOCK_FRAMES, ErrorKind, FPS, Frame, Sampler, Session, SessionOptions, Speaker};
@@ -65,7 +65,13 @@ fn live(session: &mut Session, inputs: &Inputs, piece: usize, order: u32) -> Vec
 
 #[test]
 fn chunking_and_interleaving_do_not_change_a_bit() {
-    let (engine, inputs) = (tiny(), inputs());
+    for engine in [tiny(), dram("tcn"), dram("lstm")] {
+        chunked(&engine);
+    }
+}
+
+fn chunked(engine: &std::sync::Arc<visavis::Engine>) {
+    let inputs = inputs();
     // A voice is absent until its first push; both make their appearance before the first block
     // here.
     let present = || {
@@ -81,13 +87,59 @@ fn chunking_and_interleaving_do_not_change_a_bit() {
         for (a, b) in frames.iter().zip(&whole) {
             // The gaze of a frame is measured against the head as known by then; it does not steer.
             assert_eq!(
-                (a.root, &a.global, &a.local),
-                (b.root, &b.global, &b.local),
+                (a.root, &a.global, &a.local, &a.dyadic),
+                (b.root, &b.global, &b.local, &b.dyadic),
                 "chunks of {piece}, frame {}",
                 a.index
             );
         }
     }
+}
+
+/// What no flow model has: the read-out, and a rotation of the user's head.
+#[test]
+fn the_featherweight_tier_tells_whom_the_body_follows() {
+    let inputs = inputs();
+    for backbone in ["tcn", "lstm"] {
+        let engine = dram(backbone);
+        let frames = motion_of(&engine, options(), &inputs, BLOCKS);
+        let shares = || frames.iter().flat_map(|frame| frame.dyadic.iter().copied());
+        assert!(frames.iter().all(|frame| frame.dyadic.len() == engine.rig().len()));
+        assert!(shares().all(|share| (0.0..=1.0).contains(&share)) && shares().any(|share| share > 1e-3));
+        // What makes no sense to it changes nothing.
+        let other = SessionOptions {
+            seed: 9,
+            sampler: Sampler::euler(3).unwrap(),
+            guidance: Some(3.0),
+            temperature: Some(0.1),
+            threads: 2,
+            ..options()
+        };
+        let same = motion_of(&engine, other, &inputs, BLOCKS);
+        assert!(frames.iter().zip(&same).all(|(a, b)| (&a.global, &a.dyadic) == (&b.global, &b.dyadic)));
+        assert_ne!(motion_of(&engine, SessionOptions { gaze: None, ..options() }, &inputs, BLOCKS), frames);
+        let turned = |engine: &std::sync::Arc<visavis::Engine>| {
+            let mut session = engine.session(options()).unwrap();
+            for (time, position) in &inputs.path {
+                let nod = glam::Quat::from_rotation_x(0.3 * (9.0 * *time as f32).sin());
+                session.push_user_pose(*position, Some(nod), *time).unwrap();
+            }
+            poll_blocks(&mut session, BLOCKS)
+        };
+        let still = Inputs { agent: Vec::new(), user: Vec::new(), ..inputs.clone() };
+        assert_ne!(turned(&engine), motion_of(&engine, options(), &still, BLOCKS));
+        assert_eq!(turned(&tiny()), motion(options(), &still, BLOCKS), "the flow model does not look at it");
+        assert!(turned(&tiny()).iter().all(|frame| frame.dyadic.is_empty()));
+    }
+    let mut session = dram("tcn").session(options()).unwrap();
+    assert_eq!(session.reset_with_noise(vec![0.0; 4096]).unwrap_err().kind(), ErrorKind::Argument);
+    session.set_sampler(Sampler::Single).unwrap();
+    session.set_guidance(2.0, 2.0).unwrap();
+    assert!(session.stats().cache_bytes < 64 << 10);
+    // A long gap leaves no trace once it is reset.
+    let first = run(&mut session, &inputs, BLOCKS);
+    session.reset().unwrap();
+    assert_eq!(run(&mut session, &inputs, BLOCKS), first);
 }
 
 #[test]

@@ -12,8 +12,8 @@
 
 mod common;
 
-use common::{Inputs, tiny};
-use visavis::{Budget, Governor, Sampler, Session, SessionOptions, Speaker};
+use common::{Inputs, dram, tiny};
+use visavis::{Budget, Engine, Governor, Sampler, Session, SessionOptions, Speaker};
 
 /// What became of a child that ran `work` under the filter.
 #[derive(Debug, PartialEq)]
@@ -98,8 +98,14 @@ fn compute(session: &mut Session, blocks: usize) {
 
 #[test]
 fn blocks_make_no_system_call() {
+    for engine in [tiny(), dram("tcn"), dram("lstm")] {
+        blocks_of(&engine);
+    }
+}
+
+fn blocks_of(engine: &std::sync::Arc<Engine>) {
     let inputs = Inputs::circling(8.0, 24_000);
-    let mut session = tiny().session(SessionOptions { gaze: Some(0.7), ..Default::default() }).unwrap();
+    let mut session = engine.session(SessionOptions { gaze: Some(0.7), ..Default::default() }).unwrap();
     common::run(&mut session, &inputs, 1);
 
     match confined(|| drop(std::hint::black_box(std::fs::metadata("/")))) {
@@ -142,7 +148,6 @@ fn blocks_make_no_system_call() {
     };
     assert_eq!(confined(|| governed(&mut session)), Fate::Through);
 
-    let engine = tiny();
     let mut team = engine.team(1).unwrap();
     let mut sessions = [1, 2].map(|seed| engine.session(SessionOptions { seed, ..Default::default() }).unwrap());
     sessions.iter_mut().for_each(|session| drop(common::run(session, &inputs, 1)));

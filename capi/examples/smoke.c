@@ -146,6 +146,11 @@ static uint64_t drive(const visavis_engine *engine, uint32_t threads, int blocks
     OK(visavis_session_worker_thread_ids(session, ids, 2, &id_count));
     CHECK(id_count == (HAS_THREAD_IDS ? threads - 1 : 0));
     OK(visavis_session_worker_thread_ids(session, NULL, 0, &id_count));
+    OK(visavis_session_push_user_pose(session, 0, 1.6f, 1.5f, 0, 0, 0, 1, 1e5));
+    OK(visavis_session_dyadic(session, NULL, 0, &id_count));
+    CHECK(id_count == 0);
+    REFUSED(ARGUMENT, visavis_session_dyadic(session, NULL, 1, &id_count));
+    REFUSED(ARGUMENT, visavis_session_dyadic(session, NULL, 0, NULL));
 
     /* Wrong uses of a live session. */
     REFUSED(ARGUMENT, visavis_session_poll(session, NAN, frames, sizeof *frames, joints, all, &count));

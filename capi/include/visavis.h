@@ -420,6 +420,19 @@ visavis_status visavis_session_set_audio_present(struct visavis_session *session
 // impossible are ignored and counted (visavis_stats). From any thread.
 visavis_status visavis_session_push_user_head(struct visavis_session *session, float x, float y, float z, double time);
 
+// As visavis_session_push_user_head, with the head's rotation: a quaternion of about unit length
+// in the world, identity where the user faces +Z. Bundles of the kind `dram` see where the face
+// points and how the head nods; the others make the same motion with and without.
+visavis_status visavis_session_push_user_pose(struct visavis_session *session,
+                                              float x,
+                                              float y,
+                                              float z,
+                                              float qx,
+                                              float qy,
+                                              float qz,
+                                              float qw,
+                                              double time);
+
 // Sets the gaze target from the next block on, -1 to 1: 0 is averted, 1 sustained eye
 // contact.
 visavis_status visavis_session_set_gaze(struct visavis_session *session, float target);
@@ -456,6 +469,16 @@ visavis_status visavis_session_poll(struct visavis_session *session,
                                     struct visavis_joint *joints,
                                     size_t joint_capacity,
                                     uint32_t *frame_count);
+
+// How much each joint follows the user rather than the agent's own voice and habit in the last
+// block's frames, 0 to 1: the read-out of bundles of the kind `dram`. `*count` becomes 4 times the
+// joint count, the shares of frame `i` starting at `shares[i * visavis_engine_joint_count]`, or 0
+// before the first block and with other bundles. `capacity` is the room in `shares`; too little is
+// refused.
+visavis_status visavis_session_dyadic(const struct visavis_session *session,
+                                      float *shares,
+                                      size_t capacity,
+                                      size_t *count);
 
 // Session time at which the next block is due, seconds, into `time`.
 visavis_status visavis_session_next_due(const struct visavis_session *session, double *time);

@@ -7,7 +7,7 @@ use crate::options::{VisavisSessionOptions, sampler};
 use crate::status::{Failure, Outcome, VisavisStatus, guard};
 use crate::structs::{borrow, place, room, slice};
 use std::sync::TryLockError;
-use visavis::glam::Vec3;
+use visavis::glam::{Quat, Vec3};
 use visavis::{Session, SharedSession, Speaker, VoiceInput};
 
 /// One conversation with one user.
@@ -199,6 +199,30 @@ pub unsafe extern "C" fn visavis_session_push_user_head(
     unsafe { around(session, tell) }
 }
 
+/// As visavis_session_push_user_head, with the head's rotation: a quaternion of about unit length
+/// in the world, identity where the user faces +Z. Bundles of the kind `dram` see where the face
+/// points and how the head nods; the others make the same motion with and without.
+#[unsafe(no_mangle)]
+#[allow(clippy::too_many_arguments, reason = "numbers of a pose, one by one")]
+pub unsafe extern "C" fn visavis_session_push_user_pose(
+    session: *mut VisavisSession,
+    x: f32,
+    y: f32,
+    z: f32,
+    qx: f32,
+    qy: f32,
+    qz: f32,
+    qw: f32,
+    time: f64,
+) -> VisavisStatus {
+    let tell = |shared: &SharedSession| {
+        shared.head().push_pose(Vec3::new(x, y, z), Some(Quat::from_xyzw(qx, qy, qz, qw)), time);
+        Ok(())
+    };
+    // SAFETY: the header's promise.
+    unsafe { around(session, tell) }
+}
+
 /// Sets the gaze target from the next block on, -1 to 1: 0 is averted, 1 sustained eye
 /// contact.
 #[unsafe(no_mangle)]
@@ -297,6 +321,34 @@ pub unsafe extern "C" fn visavis_session_poll(
     };
     // SAFETY: the header's promise.
     unsafe { with(session, poll) }
+}
+
+/// How much each joint follows the user rather than the agent's own voice and habit in the last
+/// block's frames, 0 to 1: the read-out of bundles of the kind `dram`. `*count` becomes 4 times the
+/// joint count, the shares of frame `i` starting at `shares[i * visavis_engine_joint_count]`, or 0
+/// before the first block and with other bundles. `capacity` is the room in `shares`; too little is
+/// refused.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_dyadic(
+    session: *const VisavisSession,
+    shares: *mut f32,
+    capacity: usize,
+    count: *mut usize,
+) -> VisavisStatus {
+    let read = |s: &mut Session| {
+        // SAFETY: the header's promise, twice.
+        let (shares, count) = unsafe { (room(shares, capacity, "shares")?, place(count, "count")?.write(0)) };
+        let all: usize = s.frames().into_iter().flatten().map(|frame| frame.dyadic.len()).sum();
+        if capacity < all {
+            return Err(Failure::argument(format!("capacity is {capacity}: a block has {all} shares")));
+        }
+        let made = s.frames().into_iter().flatten().flat_map(|frame| &frame.dyadic);
+        shares.iter_mut().zip(made).for_each(|(to, share)| _ = to.write(*share));
+        *count = all;
+        Ok(())
+    };
+    // SAFETY: the header's promise.
+    unsafe { with(session, read) }
 }
 
 /// Session time at which the next block is due, seconds, into `time`.

@@ -7,7 +7,7 @@
 
 use super::invalid;
 use crate::audio::check_audio_config;
-use crate::config::{Config, GazeConfig, GazeCurve};
+use crate::config::{Config, DramConfig, GazeConfig, GazeCurve, Kind, LstmConfig, TcnConfig};
 use crate::error::Result;
 use crate::frame::feature_count;
 use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES};
@@ -21,11 +21,33 @@ pub(super) fn config(c: &Config) -> Result<()> {
     within("user_delay_blocks", c.user_delay_blocks as usize, 1, 4)?;
     within("agent_delay_blocks", c.agent_delay_blocks as usize, 0, 4)?;
     c.rig.check()?;
-    real("pose.radius", c.pose.radius, 0.001, 10.0)?;
-
     within("audio.layers", c.audio.layers.len(), 1, 32)?;
     check_audio_config(&c.audio)?;
+    real("session.bridge", c.session.bridge, 0.0, 30.0)?;
+    match (c.kind, &c.dram) {
+        (Kind::Sarah, None) => sarah(c)?,
+        (Kind::Dram, Some(dram)) => self::dram(c, dram)?,
+        (Kind::Sarah, Some(_)) | (Kind::Dram, None) => {
+            let kind = c.kind.name();
+            return Err(invalid(format!(
+                "the config is of kind `{kind}`, and its networks are not; export the bundle again"
+            )));
+        }
+    }
+    let bytes = session_bytes(c);
+    if bytes > MAX_SESSION {
+        let (mib, most) = (bytes >> 20, MAX_SESSION >> 20);
+        return Err(invalid(format!(
+            "a session of this model would take {mib} MiB, more than {most}: the config's widths, layers or windows are wrong; \
+             export the bundle again"
+        )));
+    }
+    Ok(())
+}
 
+/// Checks the networks of the kind `sarah`.
+fn sarah(c: &Config) -> Result<()> {
+    real("pose.radius", c.pose.radius, 0.001, 10.0)?;
     let v = &c.vae;
     within("vae.layers", v.layers, 1, 64)?;
     width("vae.width", v.width, v.heads)?;
@@ -64,21 +86,32 @@ pub(super) fn config(c: &Config) -> Result<()> {
         real("session.clean_history.tau", h.tau, 0.0, 1.0)?;
         real("session.clean_history.from", h.from, 0.0, 1.0)?;
     }
-    real("session.bridge", c.session.bridge, 0.0, 30.0)?;
     within("session.anchor_period", c.session.anchor_period as usize, 0, 1 << 20)?;
     real("session.anchor_radius", c.session.anchor_radius, 0.1, 1e6)?;
     if let Some(g) = &c.gaze {
         gaze(g)?;
     }
-    let bytes = session_bytes(c);
-    if bytes > MAX_SESSION {
-        let (mib, most) = (bytes >> 20, MAX_SESSION >> 20);
-        return Err(invalid(format!(
-            "a session of this model would take {mib} MiB, more than {most}: the config's widths, layers or windows are wrong; \
-             export the bundle again"
-        )));
-    }
     Ok(())
+}
+
+/// Checks the predictors of the kind `dram`. Their inputs are those of one block before
+/// (`dram/inputs.rs`), whatever a bundle says.
+fn dram(c: &Config, dram: &DramConfig) -> Result<()> {
+    within("user_delay_blocks", c.user_delay_blocks as usize, 1, 1)?;
+    within("agent_delay_blocks", c.agent_delay_blocks as usize, 0, 0)?;
+    let tcn = |part: &str, c: &TcnConfig| {
+        within(&format!("dram.{part}.width"), c.width, 1, 4096)?;
+        within(&format!("dram.{part}.dilations"), c.dilations.len(), 1, 32)?;
+        c.dilations.iter().try_for_each(|d| within(&format!("dram.{part}.dilations"), *d, 1, 4096))
+    };
+    let lstm = |part: &str, c: &LstmConfig| {
+        within(&format!("dram.{part}.width"), c.width, 1, 4096)?;
+        within(&format!("dram.{part}.layers"), c.layers, 1, 16)
+    };
+    match dram {
+        DramConfig::Tcn { monadic, dyadic } => tcn("monadic", monadic).and(tcn("dyadic", dyadic)),
+        DramConfig::Lstm { monadic, dyadic } => lstm("monadic", monadic).and(lstm("dyadic", dyadic)),
+    }
 }
 
 /// Checks what was measured of the gaze channel.
@@ -113,13 +146,21 @@ fn session_bytes(c: &Config) -> u128 {
     let anchor = product(&[w.window_blocks + 1, BLOCK_FRAMES * features + v.latent]);
     let rows = product(&[27, w.width, 12 + w.mlp]) + product(&[6, v.width, 12 + v.mlp]);
     let modulation = product(&[9, 2, 6 * w.layers + 2, w.width]);
+    let predictors = c.dram.as_ref().map_or(0, |dram| {
+        let tcn = |c: &TcnConfig| product(&[c.dilations.iter().sum::<usize>() + 8, c.width]);
+        let lstm = |c: &LstmConfig| product(&[2 * c.layers + 8, c.width]);
+        match dram {
+            DramConfig::Tcn { monadic, dyadic } => tcn(monadic) + tcn(dyadic),
+            DramConfig::Lstm { monadic, dyadic } => lstm(monadic) + lstm(dyadic),
+        }
+    });
     let mut audio = 0;
     let mut samples = BLOCK_SAMPLES;
     for layer in &c.audio.layers {
         audio += product(&[samples + layer.kernel, layer.inputs]) + product(&[64, layer.kernel, layer.inputs]);
         samples /= layer.stride;
     }
-    4 * (flow + vae + tokens + anchor + rows + modulation + 2 * audio)
+    4 * (flow + vae + tokens + anchor + rows + modulation + predictors + 2 * audio)
 }
 
 fn width(name: &str, width: usize, heads: usize) -> Result<()> {

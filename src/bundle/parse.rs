@@ -1,7 +1,7 @@
 //! From an opened file to a config that is sound and tensors that can be asked for.
 
 use super::{BundleFile, Tensors, check, corrupt, invalid};
-use crate::config::{Config, FORMAT};
+use crate::config::{Config, DramBundle, FORMAT, Kind};
 use crate::error::{Error, ErrorKind, Result};
 
 /// Largest header that is parsed, bytes: metadata of thousands of tensors take well under one
@@ -41,6 +41,11 @@ fn parse_config(json: &str) -> Result<Config> {
     struct Version {
         format: u32,
     }
+    #[derive(serde::Deserialize)]
+    struct Kinds {
+        #[serde(default)]
+        kind: Kind,
+    }
     let unreadable = |e| invalid(format!("the bundle's config cannot be read: {e}; export the bundle again"));
     let version: Version = serde_json::from_str(json).map_err(unreadable)?;
     if version.format != FORMAT {
@@ -50,5 +55,8 @@ fn parse_config(json: &str) -> Result<Config> {
             format!("bundle format {}, but this build reads format {FORMAT}; {advice}", version.format),
         ));
     }
-    serde_json::from_str(json).map_err(unreadable)
+    match serde_json::from_str::<Kinds>(json).map_err(unreadable)?.kind {
+        Kind::Sarah => serde_json::from_str(json).map_err(unreadable),
+        Kind::Dram => serde_json::from_str::<DramBundle>(json).map_err(unreadable).map(Config::from),
+    }
 }

@@ -66,6 +66,8 @@ pub fn int16_activations(name: &str) -> bool {
     let (network, layer) = name.split_once('.').unwrap_or_default();
     match network {
         "flow" | "student" => layer == "final.out" || layer.starts_with("tau.") || layer.ends_with(".mod"),
+        // Steps of a thousandth of a pose go in and out of the predictors of the featherweight tier.
+        "monadic" | "dyadic" => layer == "into" || layer == "out",
         "vae" => layer.starts_with("decoder.") || layer == "encoder.frame" || layer == "encoder.mu",
         _ => false,
     }

@@ -12,25 +12,27 @@ impl Engine {
     /// The encoder of motion, for whoever cannot do without.
     ///
     /// # Errors
-    /// [`ErrorKind::State`] when it was not loaded.
+    /// [`ErrorKind::State`] when it was not loaded, [`ErrorKind::Argument`] for a bundle without one.
     pub(crate) fn encoder(&self) -> Result<&Encoder> {
         let missing = || Error::new(ErrorKind::State, "this engine was loaded without the encoder; load all networks");
-        self.encoder.as_ref().ok_or_else(missing)
+        self.sarah()?.encoder.as_ref().ok_or_else(missing)
     }
 
     /// The whole blocks of `frames` through encoder and decoder, as decoded: borders are not
     /// bridged and feet not held.
     ///
     /// # Errors
-    /// [`State`](crate::ErrorKind::State) without the encoder; those of decoding values that are
+    /// [`Argument`](crate::ErrorKind::Argument) for a bundle without one,
+    /// [`State`](crate::ErrorKind::State) where it was not loaded; those of decoding values that are
     /// not finite.
     #[doc(hidden)]
     pub fn round_trip(&self, frames: &[Frame]) -> Result<Vec<Frame>> {
         let rig = &self.config.rig;
         let radius = self.config.pose.radius;
-        let width = self.features();
+        let sarah = self.sarah()?;
+        let width = sarah.features();
         let mut exec = self.exec(1)?;
-        let mut networks = RoundTrip::new(self.encoder()?, &self.decoder, self.latent.width(), KvDtype::F32);
+        let mut networks = RoundTrip::new(self.encoder()?, &sarah.decoder, sarah.latent.width(), KvDtype::F32);
         let (mut features, mut motion) = (pose::Encoder::new(radius), pose::Decoder::new(self.kernels, rig, radius));
         motion.reset(frames.first().map(|f| f.root).unwrap_or_default());
         let mut metric = Metric::zeros(BLOCK_FRAMES * width);
@@ -42,9 +44,9 @@ impl Engine {
             for (i, frame) in four.iter().enumerate() {
                 features.encode(frame.root, &frame.global, metric.part_mut(i..i + 1, width));
             }
-            self.pose.standardise(metric.view(), x.view_mut());
+            sarah.pose.standardise(metric.view(), x.view_mut());
             networks.step(&mut exec, x.view(), y.view_mut());
-            self.pose.restore(y.view(), metric.view_mut());
+            sarah.pose.restore(y.view(), metric.view_mut());
             motion.decode_block(metric.view(), &mut block)?;
             out.extend(block.iter().cloned());
         }

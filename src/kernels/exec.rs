@@ -213,6 +213,19 @@ impl Exec {
     pub fn silu(&mut self, x: &mut [f32]) {
         self.kernels.gelu.run(Activation::Silu, x);
     }
+
+    /// One step of a row of LSTM cells `c`, `h` values each, from `gates` (i, f, g, o, `c.len()`
+    /// values each): c = sigmoid(f) c + sigmoid(i) tanh(g), h = sigmoid(o) tanh(c).
+    pub fn lstm(&mut self, gates: &[f32], c: &mut [f32], h: &mut [f32]) {
+        assert!(gates.len() == 4 * c.len() && h.len() == c.len(), "lstm: four gates a cell");
+        self.kernels.lstm.run(gates, c, h);
+    }
+
+    /// y = tanh |a - b|, value by value.
+    pub fn tanh_distance(&mut self, a: &[f32], b: &[f32], y: &mut [f32]) {
+        assert!(a.len() == y.len() && b.len() == y.len(), "tanh_distance: vectors of one length");
+        self.kernels.tanh_distance.run(a, b, y);
+    }
 }
 
 impl std::fmt::Debug for Exec {

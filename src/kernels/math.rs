@@ -57,6 +57,18 @@ pub(crate) fn silu(x: f32) -> f32 {
     x / (1.0 + exp(-x))
 }
 
+/// 1 / (1 + e^-x), relative error below 4e-7 for |x| < 80.
+#[inline(always)]
+pub(crate) fn sigmoid(x: f32) -> f32 {
+    1.0 / (1.0 + exp(-x))
+}
+
+/// tanh x as 2 sigmoid(2x) - 1: absolute error below 3e-7; 0 at 0, and 1 where that is nearest.
+#[inline(always)]
+pub(crate) fn tanh(x: f32) -> f32 {
+    2.0 / (1.0 + exp(-2.0 * x)) - 1.0
+}
+
 /// -2 sqrt(2/pi), and times the cubic term's weight.
 pub(crate) const GELU_A: f32 = -2.0 * 0.797_884_6;
 pub(crate) const GELU_B: f32 = 0.044_715 * GELU_A;
@@ -75,7 +87,7 @@ mod tests {
 
     #[test]
     fn functions_match_f64() {
-        let mut worst = [0.0f64; 3];
+        let mut worst = [0.0f64; 5];
         for i in -440_000..440_000 {
             let x = i as f32 * 1.97e-4;
             let rel = |got: f32, want: f64| (f64::from(got) - want).abs() / want.abs().max(1e-30);
@@ -84,10 +96,13 @@ mod tests {
             let near = x.abs() < 9.0;
             worst[1] = worst[1].max(if near { rel(silu(x), d / (1.0 + (-d).exp())) } else { 0.0 });
             let u = (2.0 / std::f64::consts::PI).sqrt() * (d + 0.044715 * d * d * d);
+            worst[3] = worst[3].max(if x.abs() < 80.0 { rel(sigmoid(x), 1.0 / (1.0 + (-d).exp())) } else { 0.0 });
+            worst[4] = worst[4].max((f64::from(tanh(x)) - d.tanh()).abs());
             let tail = if x.abs() < 3.0 { 1.0 } else { 0.1 };
             worst[2] = worst[2].max(if near { tail * rel(gelu(x), d / (1.0 + (-2.0 * u).exp())) } else { 0.0 });
         }
         assert!(worst[0] < 2e-7 && worst[1] < 4e-7 && worst[2] < 2e-6, "{worst:?}");
+        assert!(worst[3] < 4e-7 && worst[4] < 3e-7, "{worst:?}");
     }
 
     #[test]
@@ -95,6 +110,8 @@ mod tests {
         assert!(exp(f32::NAN).is_nan() && gelu(f32::NAN).is_nan() && silu(f32::NAN).is_nan());
         assert_eq!(exp(0.0), 1.0);
         assert!(exp(-1e30) < 2e-38 && exp(1e30).is_finite());
+        assert!(sigmoid(f32::NAN).is_nan() && tanh(f32::NAN).is_nan());
+        assert_eq!([tanh(0.0), tanh(50.0), tanh(-50.0), sigmoid(0.0)], [0.0, 1.0, -1.0, 0.5]);
         assert_eq!(gelu(100.0), 100.0);
         assert_eq!(gelu(0.0), 0.0);
         assert!(gelu(-100.0).abs() < 1e-30 && silu(-100.0).abs() < 1e-30);

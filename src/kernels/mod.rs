@@ -24,6 +24,8 @@
 //! | `rope` | rotary positions of queries and keys |
 //! | `attend` | attention over rings of cached keys and values, softmax included |
 //! | `gelu` | GELU and SiLU by themselves |
+//! | `lstm_cell` | a row of LSTM cells, from the sums of their gates |
+//! | `tanh_distance` | tanh of the distance of two vectors, value by value |
 //! | `fold` (one file) | a product in f64: two layers become one when a bundle is loaded |
 //! | `polar` | nearest rotations of 3x3 matrices: all joints of a frame |
 //!
@@ -96,6 +98,7 @@ mod gelu;
 mod interleave;
 mod level;
 mod linear;
+mod lstm_cell;
 mod math;
 mod matmul_f32_f16;
 mod matmul_f32_f32;
@@ -110,6 +113,7 @@ mod quantize_rows;
 mod rope;
 mod rows;
 mod split_rows;
+mod tanh_distance;
 #[cfg(any(test, feature = "kernel-tests"))]
 mod testing;
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
@@ -177,6 +181,8 @@ kernels! {
     norm: norm::Norm,
     rope: rope::Rope,
     gelu: gelu::Activate,
+    lstm: lstm_cell::LstmCell,
+    tanh_distance: tanh_distance::TanhDistance,
     polar: polar::Polar,
     fold: fold::Fold,
 }

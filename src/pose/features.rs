@@ -132,6 +132,55 @@ impl Decoder {
         self.guard.prime(&self.joints[..self.previous.len()]);
     }
 
+    /// As [`Decoder::prime`], of joints in their heading frame.
+    ///
+    /// # Panics
+    /// If there are not J of them.
+    pub fn prime_joints(&mut self, joints: &[Transform]) {
+        assert_eq!(joints.len(), self.previous.len(), "one transform a joint");
+        self.guard.prime(joints);
+    }
+
+    /// As [`Decoder::decode_block_on`], of joints instead of features: `place` writes those of
+    /// frame `i`, each frame's in its heading frame, and returns the root's step to it.
+    ///
+    /// # Errors
+    /// As [`Decoder::decode_block_on`].
+    ///
+    /// # Panics
+    /// If there are more than four frames.
+    pub fn joints_block_on(
+        &mut self,
+        pool: Option<&mut Pool>,
+        place: impl Fn(usize, &mut [Transform]) -> [f32; ROOT_CHANNELS],
+        frames: &mut [Frame],
+    ) -> Result<()> {
+        assert!(frames.len() <= BLOCK_FRAMES, "a block has at most four frames");
+        let n = self.previous.len();
+        for i in 0..frames.len() {
+            self.steps[i] = place(i, &mut self.joints[i * n..(i + 1) * n]);
+        }
+        let joints = &self.joints[..frames.len() * n];
+        let finite = joints.iter().all(|j| j.position.is_finite() && j.rotation.is_finite())
+            && self.steps[..frames.len()].as_flattened().iter().all(|v| v.is_finite());
+        if !self.guarded && !finite {
+            return Err(not_finite());
+        }
+        self.judge(frames);
+        self.show(pool, frames);
+        Ok(())
+    }
+
+    /// Joints of frame `i` of the last block as it was shown, in their heading frame, and the
+    /// root's step to it.
+    ///
+    /// # Panics
+    /// If `i` is not below 4.
+    pub fn shown_joints(&self, i: usize) -> (&[Transform], [f32; ROOT_CHANNELS]) {
+        let n = self.previous.len();
+        (&self.joints[i * n..(i + 1) * n], self.steps[i])
+    }
+
     /// Decodes the next frame: advances the root and fills `root`, `global`, `hips`, `local`,
     /// `fit_error` and `held` of `frame`; its other fields are left alone.
     ///
@@ -175,23 +224,28 @@ impl Decoder {
         frames: &mut [Frame],
     ) -> Result<()> {
         let x = x.values();
-        let (n, width) = (self.previous.len(), self.feature_count());
+        let width = self.feature_count();
         assert!(frames.len() <= BLOCK_FRAMES, "a block has at most four frames");
         assert_eq!(x.len(), width * frames.len(), "a feature vector has 3 + 36 J values");
         if !self.guarded && !x.iter().all(|v| v.is_finite()) {
-            return Err(Error::new(
-                ErrorKind::State,
-                "the model gave a pose that is not finite; reset the session, and check the bundle if it happens again",
-            ));
+            return Err(not_finite());
         }
         self.transforms(pool.as_deref_mut(), x);
-        for (i, frame) in frames.iter_mut().enumerate() {
+        for i in 0..frames.len() {
             self.steps[i] = [0, 1, 2].map(|c| x[i * width + c]);
+        }
+        self.judge(frames);
+        self.show(pool, frames);
+        Ok(())
+    }
+
+    /// Lets the guard, if there is one, judge the joints and steps of `frames`.
+    fn judge(&mut self, frames: &mut [Frame]) {
+        let n = self.previous.len();
+        for (i, frame) in frames.iter_mut().enumerate() {
             let joints = &mut self.joints[i * n..(i + 1) * n];
             frame.held = if self.guarded { self.guard.check(joints, &mut self.steps[i]) } else { 0.0 };
         }
-        self.show(pool, frames);
-        Ok(())
     }
 
     /// Up to four frames for which there are no usable features: the guard treats them as it does
@@ -297,6 +351,13 @@ impl Decoder {
             }
         });
     }
+}
+
+fn not_finite() -> Error {
+    Error::new(
+        ErrorKind::State,
+        "the model gave a pose that is not finite; reset the session, and check the bundle if it happens again",
+    )
 }
 
 /// Calls `work` for each of `items` with one of the `tools`, on the threads of `pool` if there is

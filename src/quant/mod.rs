@@ -88,6 +88,14 @@ pub fn quantise(file: &BundleFile<'_>, options: &Options<'_>) -> Result<Quantise
     let reference = crate::engine::Engine::from_file(file, crate::kernels::Kernels::detect()?)?;
     let layers = layers(&tensors)?;
     let schemes = keep::apply(options, &layers)?;
+    if options.calibration.is_some() || options.budget.is_some() {
+        // Statistics and sensitivity are measured on latents.
+        reference.sarah().map_err(|_| {
+            argument(
+                "calibration and budgets are for bundles of the kind `sarah`; leave them out for `dram`".to_owned(),
+            )
+        })?;
+    }
     let calibration = options.calibration.map(|scene| Calibration::new(&reference, scene)).transpose()?;
     let rounder = Rounder { layers: &layers, calibration: calibration.as_ref() };
     let (schemes, choice) = match options.budget {

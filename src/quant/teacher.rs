@@ -135,7 +135,7 @@ impl Teacher {
             return Err(argument(message.to_owned()));
         }
         let mut session = Session::listened(Arc::clone(candidate), self.options.clone(), None)?;
-        session.reset_to(self.engine.idle.view());
+        session.reset_to(self.engine.sarah()?.idle.view());
         let mut forced = Forced { frames: Vec::new(), latents: [Vec::new(), Vec::new()], round_trip: Vec::new() };
         self.scene.play(&mut session, |session, block| {
             let (taught, made) = (&self.blocks[block], session.made());
@@ -151,7 +151,7 @@ impl Teacher {
             let vertices = joints.as_chunks::<{ crate::frame::JOINT_CHANNELS }>().0;
             vertices.iter().map(|v| pose::icosahedron::decode(v, radius).0).collect()
         };
-        let width = candidate.features();
+        let width = candidate.sarah()?.features();
         for (a, b) in self.round_trip.iter().zip(self.through(candidate, &mut None)?) {
             for (a, b) in a.values().chunks_exact(width).zip(b.values().chunks_exact(width)) {
                 forced.round_trip.extend(joints(a).iter().zip(joints(b)).map(|(a, b)| a.distance(b)));
@@ -165,14 +165,14 @@ impl Teacher {
         let mut exec = engine.exec(1)?;
         exec.listen(activations.take());
         let latent = engine.config().vae.latent;
-        let mut networks = RoundTrip::new(engine.encoder()?, &engine.decoder, latent, KvDtype::F16);
+        let mut networks = RoundTrip::new(engine.encoder()?, &engine.sarah()?.decoder, latent, KvDtype::F16);
         let mut out = Vec::with_capacity(self.blocks.len());
         exec.begin();
         for block in &self.blocks {
             let len = block.features.values().len();
             let (mut x, mut metric) = (Standardised::zeros(len), Metric::zeros(len));
             networks.step(&mut exec, block.features.view(), x.view_mut());
-            engine.pose.restore(x.view(), metric.view_mut());
+            engine.sarah()?.pose.restore(x.view(), metric.view_mut());
             out.push(metric);
         }
         exec.end();

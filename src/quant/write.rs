@@ -30,9 +30,9 @@ pub(super) fn bundle(
     for (name, view) in tensors.iter().filter(|(name, _)| !record.tensors.contains_key(*name)) {
         let shape = view.shape().to_vec();
         let entry = match (name, view.dtype()) {
-            (IDLE_FRAMES, _) => {
+            (IDLE_FRAMES, _) if reference.sarah().is_ok() => {
                 let shape = vec![reference.idle_blocks(), reference.config().vae.latent];
-                (IDLE_LATENTS.to_owned(), Dtype::F32, shape, floats(reference.idle.values()))
+                (IDLE_LATENTS.to_owned(), Dtype::F32, shape, floats(reference.sarah()?.idle.values()))
             }
             (_, Dtype::F32) if asked == Scheme::F16 && !stays(name, &record) => match narrowed(view.data()) {
                 Some(halves) => (name.to_owned(), Dtype::F16, shape, halves),

@@ -20,8 +20,9 @@
 use super::diagnostics::Anchoring;
 use super::governor::Share;
 use super::options::SessionOptions;
-use super::tools::Tools;
-use crate::engine::Engine;
+use super::tools::SarahTools;
+use crate::config::Config;
+use crate::engine::Sarah;
 use crate::flow::{Generator, Stretch};
 use crate::frame::{BLOCK_FRAMES, Root};
 use crate::normaliser::{Metric, Standardised};
@@ -93,19 +94,19 @@ impl Moment<'_> {
 }
 
 impl Anchor {
-    pub(super) fn new(engine: &Engine, options: &SessionOptions) -> Self {
+    pub(super) fn new(config: &Config, sarah: &Sarah, options: &SessionOptions) -> Self {
         let period = match options.diagnostics.anchoring {
-            _ if engine.encoder.is_none() => 0,
-            Anchoring::Bundle => engine.config.session.anchor_period,
+            _ if sarah.encoder.is_none() => 0,
+            Anchoring::Bundle => config.session.anchor_period,
             Anchoring::Never => 0,
             Anchoring::Every(blocks) => blocks,
         };
         // Without re-anchoring nobody looks back.
-        let capacity = if period == 0 { 1 } else { engine.config.flow.window_blocks as u64 + 1 };
-        let (width, latent) = (BLOCK_FRAMES * engine.features(), engine.config.vae.latent);
+        let capacity = if period == 0 { 1 } else { config.flow.window_blocks as u64 + 1 };
+        let (width, latent) = (BLOCK_FRAMES * sarah.features(), config.vae.latent);
         Self {
             period: u64::from(period),
-            radius: f64::from(engine.config.session.anchor_radius),
+            radius: f64::from(config.session.anchor_radius),
             phase: Phase::Rest,
             blocks: 0,
             first: 0,
@@ -113,8 +114,8 @@ impl Anchor {
             anchored_at: 0,
             requested: false,
             anchor: options.start,
-            encoder: engine.encoder.as_ref().map(|encoder| encoder.state(options.diagnostics.cache)),
-            next: engine.decoder.state(options.diagnostics.cache),
+            encoder: sarah.encoder.as_ref().map(|encoder| encoder.state(options.diagnostics.cache)),
+            next: sarah.decoder.state(options.diagnostics.cache),
             capacity,
             features: Standardised::zeros(capacity as usize * width),
             latents: Metric::zeros(capacity as usize * latent),
@@ -181,7 +182,7 @@ impl Anchor {
     }
 
     /// Does a block's share of the work; may cross-fade the features and swap decoders.
-    pub(super) fn step(&mut self, tools: &mut Tools<'_>, mut moment: Moment<'_>) {
+    pub(super) fn step(&mut self, tools: &mut SarahTools<'_>, mut moment: Moment<'_>) {
         if self.period == 0 {
             return;
         }
@@ -200,15 +201,15 @@ impl Anchor {
 
     /// Encodes a few blocks from `from` on; when the present is reached, new latents replace the
     /// old ones.
-    fn encode(&mut self, tools: &mut Tools<'_>, moment: &mut Moment<'_>, from: u64) {
-        let (engine, current) = (tools.engine, self.blocks);
+    fn encode(&mut self, tools: &mut SarahTools<'_>, moment: &mut Moment<'_>, from: u64) {
+        let (model, current) = (tools.model, self.blocks);
         let to = current.min(from + BLOCKS_PER_STEP);
         for block in from..to {
             let at = self.at(block);
             let features = self.features.part(at..at + 1, self.width);
             let latent = self.latents.part_mut(at..at + 1, self.latent);
-            if let Some((encoder, state)) = engine.encoder.as_ref().zip(self.encoder.as_mut()) {
-                encoder.step(tools.exec, &mut tools.work.vae, state, features, latent);
+            if let Some((encoder, state)) = model.encoder.as_ref().zip(self.encoder.as_mut()) {
+                encoder.step(tools.exec, tools.vae, state, features, latent);
             }
         }
         self.phase = Phase::Encode(to);
@@ -216,7 +217,7 @@ impl Anchor {
             self.started = self.started.max(current.saturating_sub(self.capacity - 1));
             for block in self.started..current {
                 let at = self.at(block);
-                engine.latent.standardise(self.latents.part(at..at + 1, self.latent), self.z.view_mut());
+                model.latent.standardise(self.latents.part(at..at + 1, self.latent), self.z.view_mut());
                 moment.generator.replace(block, self.z.view());
             }
             self.phase = Phase::Refill(0, self.started);
@@ -224,7 +225,7 @@ impl Anchor {
     }
 
     /// Computes a few passes of slot caches anew, from slot `slot` and token `from` on.
-    fn refill(&mut self, tools: &mut Tools<'_>, moment: &mut Moment<'_>, mut slot: usize, mut from: u64) {
+    fn refill(&mut self, tools: &mut SarahTools<'_>, moment: &mut Moment<'_>, mut slot: usize, mut from: u64) {
         let generator = &mut *moment.generator;
         for _ in 0..PASSES_PER_STEP {
             if slot >= generator.slot_count() {
@@ -238,7 +239,7 @@ impl Anchor {
         self.phase = Phase::Refill(slot, from);
         if slot >= generator.slot_count() {
             // As much past as the decoder sees, and no more than the history is sure to hold.
-            let config = &tools.engine.config;
+            let config = tools.config;
             let window = config.vae.window_blocks.min(config.flow.window_blocks) as u64;
             let from = self.blocks.saturating_sub(window).max(self.first);
             self.next.reset(from);
@@ -247,12 +248,12 @@ impl Anchor {
     }
 
     /// Decodes a few blocks from `from` on; when the present is reached, the decoder takes over.
-    fn decode(&mut self, tools: &mut Tools<'_>, moment: &mut Moment<'_>, from: u64) {
+    fn decode(&mut self, tools: &mut SarahTools<'_>, moment: &mut Moment<'_>, from: u64) {
         let current = self.blocks;
         let to = current.min(from + BLOCKS_PER_STEP);
         let Self { next, scratch, restored, .. } = self;
         for block in from..to {
-            tools.engine.latent.restore(moment.generator.latent(block), restored.view_mut());
+            tools.model.latent.restore(moment.generator.latent(block), restored.view_mut());
             tools.decode(Decoding { state: next, z: restored.view(), out: scratch.view_mut() });
         }
         self.phase = Phase::Decode(to);

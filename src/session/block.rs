@@ -1,22 +1,20 @@
 //! One session's block, stage by stage. What computes it is the [`pipeline`](super::pipeline).
 
 use super::SessionOptions;
-use super::anchor::Moment;
 use super::governor::{Hold, Plan};
 use super::inputs::Listening;
-use super::probe::Probe;
-use super::state::{BlockState, Made};
-use super::tools::Tools;
-use crate::engine::Engine;
+use super::maker::Maker;
+use super::probe::{Probe, tell};
+use super::state::BlockState;
+use super::tools::{DramTools, Kit, SarahTools, Tools};
+use crate::dram::Agent;
+use crate::engine::{Engine, Model};
 use crate::error::Result;
 use crate::flow::Generator;
 use crate::frame::{BLOCK_FRAMES, FPS};
 use crate::par::Pool;
 use crate::pose::gaze_score;
 use crate::vae::Decoding;
-
-/// Standardised latents are of unit scale; what is this far out, or not a number, is no latent.
-const MAX_LATENT: f32 = 1000.0;
 
 /// A session's next block.
 pub(super) struct Block<'a> {
@@ -47,8 +45,15 @@ impl Block<'_> {
         self.state.inputs.voice_inputs(self.state.block)
     }
 
-    pub(super) fn generator(&mut self) -> &mut Generator {
-        &mut self.state.generator
+    /// Its generator of latents, if it has one.
+    pub(super) fn generator(&mut self) -> Option<&mut Generator> {
+        self.state.maker.latent().map(|maker| &mut maker.generator)
+    }
+
+    /// Its agent in a step, if it goes by steps.
+    pub(super) fn agent(&mut self) -> Option<Agent<'_>> {
+        let BlockState { maker, inputs, .. } = &mut *self.state;
+        maker.step().map(|maker| maker.agent(inputs))
     }
 
     /// Holds the last pose instead of computing motion, and rehearses a step where the plan says
@@ -60,81 +65,77 @@ impl Block<'_> {
             return;
         }
         if plan.hold == Hold::Rehearse {
-            state.inputs.condition.clear();
-            state.generator.rehearse(&mut tools.flow(), plan.sampler, &state.inputs.condition);
+            let BlockState { maker, inputs, motion, .. } = &mut **state;
+            match (maker, tools.kit()) {
+                (Maker::Latent(maker), Kit::Sarah(mut tools)) => maker.rehearse(&mut tools, inputs, plan.sampler),
+                (Maker::Step(maker), Kit::Dram(mut tools)) => maker.rehearse(&mut tools, inputs, motion.root()),
+                _ => {}
+            }
         }
         state.motion.hold_block(&mut state.frames);
+        state.frames.iter_mut().for_each(|frame| frame.dyadic.fill(0.0));
         state.label(tools.engine, plan);
     }
 
-    /// Makes the conditioning, for which voices have listened, and begins the latent.
+    /// Makes the conditioning, for which voices have listened, and begins the latent or the steps.
     pub(super) fn begin(&mut self, engine: &Engine) {
         let Self { options, plan, state, probe, .. } = self;
-        let gaze = engine.config.gaze.as_ref();
-        let gaze = options.diagnostics.gaze_control.cue(gaze, options.gaze, plan.sampler, options.seed, state.block);
-        self.outcome = state.inputs.prepare(state.block, &state.motion.root(), gaze, probe);
-        if self.outcome.is_err() {
-            return;
+        let BlockState { maker, inputs, motion, block, .. } = &mut **state;
+        let root = motion.root();
+        match maker {
+            Maker::Latent(maker) => {
+                let gaze = engine.config.gaze.as_ref();
+                let gaze = options.diagnostics.gaze_control.cue(gaze, options.gaze, plan.sampler, options.seed, *block);
+                self.outcome = inputs.prepare(*block, &root, gaze, probe);
+                if self.outcome.is_err() {
+                    return;
+                }
+                let temperature = options.temperature(&engine.config);
+                maker.generator.begin(plan.sampler, options.guidance(engine), &inputs.condition, |token, eps| {
+                    maker.noise.fill(options, temperature, token, eps);
+                });
+            }
+            Maker::Step(maker) => match inputs.heard(*block, probe) {
+                Ok(heard) => maker.begin(root, heard, inputs.seen(*block, options.gaze)),
+                Err(error) => self.outcome = Err(error),
+            },
         }
-        let BlockState { generator, inputs, noise, .. } = &mut **state;
-        generator.begin(plan.sampler, options.guidance(engine), &inputs.condition, |token, eps| {
-            noise.fill(engine, options, token, eps);
-        });
     }
 
     /// Tells about an evaluation of the network.
     pub(super) fn evaluated(&mut self) {
-        if let Some(probe) = &mut self.probe {
-            probe.stage(self.state.block, "x1", self.state.generator.x1());
+        if let (Some(probe), Some(maker)) = (&mut self.probe, self.state.maker.latent()) {
+            probe.stage(self.state.block, "x1", maker.generator.x1());
+        }
+    }
+
+    /// Tells about a step, row `i` of those that were made together.
+    pub(super) fn stepped(&mut self, tools: &DramTools<'_>, i: usize) {
+        if let (Some(probe), Some(maker)) = (&mut self.probe, self.state.maker.step()) {
+            for (name, values) in tools.work.stages(i) {
+                probe.stage(self.state.block, name, values);
+            }
+            probe.stage(self.state.block, "poses", maker.state.standardised());
         }
     }
 
     /// Takes the latent that the generator made.
-    pub(super) fn take_latent(&mut self, engine: &Engine) {
-        let state = &mut *self.state;
-        state.z.values_mut().copy_from_slice(state.generator.last_latent().values());
-        if let Some(probe) = &mut self.probe {
-            probe.stage(state.block, "latents", state.z.values());
+    pub(super) fn take_latent(&mut self, tools: &SarahTools<'_>) {
+        if let Some(maker) = self.state.maker.latent() {
+            maker.take_latent(tools.model, self.options.guard, self.state.block, &mut self.probe);
         }
-        let usable = !self.options.guard || state.z.values().iter().all(|z| z.abs() < MAX_LATENT);
-        state.made = if usable { Made::Latent } else { Made::Unusable };
-        if !usable {
-            // Nothing of the kind may stay in the history or in a cache.
-            state.z.values_mut().fill(0.0);
-            state.generator.replace(state.generator.next_token() - 1, state.z.view());
-            state.generator.forget();
-        }
-        engine.latent.restore(state.z.view(), state.latent.view_mut());
     }
 
-    /// The decoder's part of the block.
-    pub(super) fn decoding(&mut self) -> Decoding<'_> {
-        self.state.decoding()
+    /// The decoder's part of the block, if there is one.
+    pub(super) fn decoding(&mut self) -> Option<Decoding<'_>> {
+        self.state.maker.latent().map(|maker| maker.decoding())
     }
 
     /// What follows the decoder: re-anchoring and catching up.
-    pub(super) fn decoded(&mut self, tools: &mut Tools<'_>) {
-        let state = &mut *self.state;
-        if self.options.guard && !state.features.values().iter().all(|v| v.is_finite()) {
-            state.decoder.reset(state.block);
-        }
-        let usable = state.made == Made::Latent;
-        let moment = Moment {
-            generator: &mut state.generator,
-            decoder: &mut state.decoder,
-            latent: state.latent.view(),
-            features: usable.then(|| state.features.view_mut()),
-            root: state.motion.root(),
-            time: self.plan.anchor,
-        };
-        state.anchor.step(tools, moment);
-        if let (Some(probe), true) = (&mut self.probe, usable) {
-            probe.stage(state.block, "decoded", state.features.values());
-        }
-        if let Some((passes, sampler)) = self.plan.catch_up {
-            for _ in 0..passes {
-                state.generator.catch_up(&mut tools.flow(), sampler);
-            }
+    pub(super) fn decoded(&mut self, tools: &mut SarahTools<'_>) {
+        let BlockState { maker, motion, block, .. } = &mut *self.state;
+        if let Some(maker) = maker.latent() {
+            maker.decoded(tools, (self.options.guard, &self.plan), motion.root(), *block, &mut self.probe);
         }
     }
 
@@ -150,6 +151,9 @@ impl Block<'_> {
         }
         if let Some(probe) = &mut self.probe {
             probe.frames(self.state.block, &self.state.frames);
+            if let Some(maker) = self.state.maker.step() {
+                tell(&mut self.probe, self.state.block, "dyadic", maker.state.dyadic());
+            }
         }
         self.state.block += 1;
     }
@@ -166,26 +170,14 @@ impl Posing<'_> {
 }
 
 impl BlockState {
-    /// Makes frames of the features.
+    /// Makes frames of what was made.
     fn pose(&mut self, pool: Option<&mut Pool>, engine: &Engine) -> Result<()> {
-        let before = self.motion.guard_stats();
-        match self.made {
-            Made::Latent => {
-                engine.pose.restore(self.features.view(), self.metric.view_mut());
-                self.motion.decode_block_on(pool, self.metric.view(), &mut self.frames)?;
-            }
-            Made::Unusable => self.motion.miss_block_on(pool, &mut self.frames),
+        let Self { maker, motion, frames, .. } = self;
+        match (maker, &engine.model) {
+            (Maker::Latent(maker), Model::Sarah(sarah)) => maker.pose(sarah, motion, pool, frames),
+            (Maker::Step(maker), Model::Dram(dram)) => maker.pose(dram, motion, pool, frames),
+            _ => Ok(()),
         }
-        if self.frames.iter().any(|frame| frame.held > 0.0) {
-            // The history must hold what was shown.
-            self.motion.shown(self.metric.view_mut());
-            engine.pose.standardise(self.metric.view(), self.features.view_mut());
-            self.anchor.amend(self.features.view());
-        }
-        if self.motion.guard_stats().trips > before.trips {
-            self.anchor.request();
-        }
-        Ok(())
     }
 
     /// Says of the frames when they are shown, what made them and where they look.

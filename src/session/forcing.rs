@@ -1,10 +1,12 @@
 //! What a teacher does to a session: it listens to the layers, and puts another session's block in
-//! the place of the one just made, so that the next one is made from that past. For the quantiser;
-//! nothing of it is public.
+//! the place of the one just made, so that the next one is made from that past. For the quantiser,
+//! and of the flow model alone; nothing of it is public.
 
 use super::Session;
+use super::maker::Maker;
 use super::options::SessionOptions;
-use super::tools::Tools;
+use super::state::BlockState;
+use super::tools::{Kit, Tools};
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::frame::Frame;
@@ -52,25 +54,28 @@ impl Session {
 
     /// The last block.
     pub(crate) fn made(&self) -> MadeBlock {
-        MadeBlock {
-            z: self.state.z.clone(),
-            features: self.state.features.clone(),
-            frames: self.state.frames.clone(),
-            motion: self.state.motion.clone(),
-        }
+        let BlockState { maker, frames, motion, .. } = &self.state;
+        let (z, features) = match maker {
+            Maker::Latent(maker) => (maker.z.clone(), maker.features.clone()),
+            Maker::Step(_) => Default::default(),
+        };
+        MadeBlock { z, features, frames: frames.clone(), motion: motion.clone() }
     }
 
     /// Puts `block`, another session's, in the place of the one just made: its latent through this
     /// session's own decoder, its motion as it stood.
     pub(crate) fn follow(&mut self, block: &MadeBlock) {
         let Self { exec, work, engine, state, .. } = self;
-        state.generator.replace(state.generator.next_token() - 1, block.z.view());
-        engine.latent.restore(block.z.view(), state.latent.view_mut());
-        state.decoder.back();
-        exec.begin();
-        Tools { exec, work, engine }.decode(state.decoding());
-        state.anchor.amend(state.features.view());
+        let mut tools = Tools { exec, work, engine };
+        if let (Some(maker), Kit::Sarah(mut tools)) = (state.maker.latent(), tools.kit()) {
+            maker.generator.replace(maker.generator.next_token() - 1, block.z.view());
+            tools.model.latent.restore(block.z.view(), maker.latent.view_mut());
+            maker.decoder.back();
+            tools.exec.begin();
+            tools.decode(maker.decoding());
+            maker.anchor.amend(maker.features.view());
+            tools.exec.end();
+        }
         state.motion.clone_from(&block.motion);
-        self.exec.end();
     }
 }

@@ -7,6 +7,7 @@ use super::stats::{Delays, InputStats};
 use crate::audio::TractEncoder;
 use crate::audio::{AudioBackend, AudioEncoder, Speaker, Voice, VoiceInput};
 use crate::config::Config;
+use crate::dram::Seen;
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::flow::Condition;
@@ -235,6 +236,28 @@ impl Inputs {
             self.condition.set_gaze(value, guided);
         }
         Ok(())
+    }
+
+    /// Which voices, the agent's and the user's, were heard for `block`.
+    pub(super) fn heard(&mut self, block: u64, probe: &mut Option<&mut dyn Probe>) -> Result<[bool; 2]> {
+        let agent = self.agent.features()?.inspect(|features| tell(probe, block, "agent_features", features)).is_some();
+        let user = self.user.features()?.inspect(|features| tell(probe, block, "user_features", features)).is_some();
+        Ok([agent, user])
+    }
+
+    /// Features of both voices, `[4, features]` each, which mean something where they were heard.
+    pub(super) fn voice_features(&self) -> [&[f32]; 2] {
+        [&self.agent.features, &self.user.features]
+    }
+
+    /// The user's head in each of the four frames that `block` may know, and the wanted gaze.
+    pub(super) fn seen(&mut self, block: u64, gaze: Option<f32>) -> [Seen; BLOCK_FRAMES] {
+        let mut samples = [UserSample::default(); BLOCK_FRAMES];
+        if let Some(seen) = block.checked_sub(self.user_delay).filter(|seen| *seen >= self.user.first) {
+            let now = (block * BLOCK_FRAMES as u64) as f64 / f64::from(FPS);
+            self.track.block(seen * BLOCK_FRAMES as u64, now, &mut samples);
+        }
+        samples.map(|sample| Seen { head: known(sample), rotation: sample.rotation, gaze })
     }
 
     /// Floor positions `(x, z)` of the user over the four frames that `block` may know, in the

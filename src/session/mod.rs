@@ -15,6 +15,9 @@
 //! | `inputs` | voices and head positions to the conditioning of a block |
 //! | `gaze` | the wanted gaze to the gaze channel, free gaze included |
 //! | `state` | all that changes from block to block |
+//! | `maker` | what makes the poses, by the bundle's kind |
+//! | `by_latent` | the flow model: a latent a block, decoded |
+//! | `by_step` | the featherweight tier: a step a frame |
 //! | `block` | a block, stage by stage |
 //! | `pipeline` | the computation of blocks, one or several together |
 //! | `tools` | threads, working memory and weights, which blocks are computed with |
@@ -36,6 +39,8 @@
 
 mod anchor;
 mod block;
+mod by_latent;
+mod by_step;
 mod controls;
 mod diagnostics;
 #[cfg(feature = "quant")]
@@ -43,6 +48,7 @@ mod forcing;
 mod gaze;
 mod governor;
 mod inputs;
+mod maker;
 mod noise;
 mod options;
 mod pipeline;
@@ -73,7 +79,7 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::frame::Frame;
 use crate::kernels::Exec;
 use crate::user::HeadInput;
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use governor::{Log, Policy};
 use state::BlockState;
 use std::sync::Arc;
@@ -135,7 +141,7 @@ impl Session {
     fn on(mut exec: Exec, engine: Arc<Engine>, options: SessionOptions) -> Result<Self> {
         let state = BlockState::new(&mut exec, &engine, &options)?;
         let mut session = Self {
-            work: Workspace::new(&engine, 1),
+            work: Workspace::new(&engine, 1, 1),
             controls: Controls::new(&engine, |sampler| state.supports(sampler)),
             engine,
             options,
@@ -191,7 +197,18 @@ impl Session {
     /// # Errors
     /// None today; the result leaves room for typed refusals.
     pub fn push_user_head(&mut self, position: Vec3, time: f64) -> Result<()> {
-        self.state.inputs.head().push(position, time);
+        self.push_user_pose(position, None, time)
+    }
+
+    /// As [`Session::push_user_head`], with the head's rotation where it is known: a quaternion of
+    /// about unit length in the world, identity where the user faces +Z. The same as
+    /// [`HeadInput::push_pose`]. Bundles of the kind `dram` see where the user's face points and how
+    /// it nods; the others make the same motion with and without.
+    ///
+    /// # Errors
+    /// As [`Session::push_user_head`].
+    pub fn push_user_pose(&mut self, position: Vec3, rotation: Option<Quat>, time: f64) -> Result<()> {
+        self.state.inputs.head().push_pose(position, rotation, time);
         self.state.inputs.look();
         Ok(())
     }
@@ -231,10 +248,10 @@ impl Session {
             block_ms: self.times.percentiles(),
             delays: self.state.inputs.delays(&self.engine.config),
             inputs: self.state.inputs.stats(),
-            anchorings: self.state.anchor.count(),
+            anchorings: self.state.maker.anchorings(),
             governor: self.governor_stats(),
             guard: self.state.motion.guard_stats(),
-            cache_bytes: self.state.cache_bytes(),
+            cache_bytes: self.state.maker.cache_bytes(),
         }
     }
 

@@ -1,7 +1,6 @@
 //! Where the noise of tokens comes from.
 
 use super::SessionOptions;
-use crate::engine::Engine;
 use crate::flow::normal;
 
 /// Where the noise of tokens comes from.
@@ -16,13 +15,12 @@ pub(super) enum Noise {
 impl Noise {
     /// Fills the noise of a token. What is seeded is scaled by the temperature; what is given
     /// enters as it is.
-    pub(super) fn fill(&self, engine: &Engine, options: &SessionOptions, token: u64, eps: &mut [f32]) {
+    pub(super) fn fill(&self, options: &SessionOptions, temperature: f32, token: u64, eps: &mut [f32]) {
         if let Noise::Given(values) = self
             && let Some(given) = values.chunks_exact(eps.len()).nth((token - options.diagnostics.first_block) as usize)
         {
             return eps.copy_from_slice(given);
         }
-        let temperature = options.temperature(engine);
         normal(options.seed, token, eps);
         eps.iter_mut().for_each(|e| *e *= temperature);
     }

@@ -2,7 +2,7 @@
 
 use super::diagnostics::{Diagnostics, HistoryTime};
 use super::{Governor, argument};
-use crate::config::CleanHistory;
+use crate::config::{CleanHistory, Config};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::flow::Guidance;
@@ -12,6 +12,10 @@ use crate::frame::{Root, Sampler};
 ///
 /// Start from `SessionOptions::default()` and change what is needed:
 /// `SessionOptions { gaze: Some(0.8), ..Default::default() }`.
+///
+/// Bundles of the kind `dram` are deterministic and make a frame a step: seed, sampler, guidance and
+/// temperature change nothing there, a gaze target is one input among others, and a governor can
+/// only hold the pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionOptions {
     /// Seed of the noise: same seed and same inputs, same bits.
@@ -81,16 +85,17 @@ impl SessionOptions {
         }
         self.diagnostics.check()?;
         self.governor.check()?;
+        let Ok(sarah) = engine.sarah() else { return Ok(()) };
         match self.sampler {
-            Sampler::Single if engine.student.is_some() => Ok(()),
+            Sampler::Single if sarah.student.is_some() => Ok(()),
             Sampler::Single => Err(unsupported(Sampler::Single, engine)),
-            _ if engine.flow.is_some() => Ok(()),
+            _ if sarah.flow.is_some() => Ok(()),
             other => Err(unsupported(other, engine)),
         }
     }
 
-    pub(super) fn temperature(&self, engine: &Engine) -> f32 {
-        self.temperature.unwrap_or(engine.config.session.temperature)
+    pub(super) fn temperature(&self, config: &Config) -> f32 {
+        self.temperature.unwrap_or(config.session.temperature)
     }
 
     pub(super) fn clean_history(&self, engine: &Engine) -> Option<CleanHistory> {
@@ -133,14 +138,14 @@ pub(super) fn check_block_time(milliseconds: f64) -> Result<()> {
 
 pub(super) fn unsupported(sampler: Sampler, engine: &Engine) -> Error {
     argument(match sampler {
-        Sampler::Single if engine.student.is_none() && engine.config.student.is_some() => {
+        Sampler::Single if !engine.has_student() && engine.config.student.is_some() => {
             "the single-step sampler needs the student network, which this engine was loaded without".to_owned()
         }
-        Sampler::Single if engine.student.is_none() => {
+        Sampler::Single if !engine.has_student() => {
             "the single-step sampler needs a bundle with a student network; this one has none (see `visavis inspect`)"
                 .to_owned()
         }
-        _ if engine.flow.is_none() => {
+        _ if engine.sarah().is_ok_and(|sarah| sarah.flow.is_none()) => {
             format!("{sampler} needs the reference network, which this engine was loaded without: use the single step")
         }
         _ => format!("{sampler}: its flow times have no caches in this session; make a session with that sampler"),

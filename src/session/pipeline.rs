@@ -3,6 +3,7 @@
 //!
 //! ```text
 //! listen -> begin (conditioning, noise) -> sample (passes shared) -> decode -> re-anchor -> pose
+//!                                       -> step, step, step, step (passes shared) ------>
 //! ```
 //!
 //! With one block both threads work in each of its layers; with several, what belongs to one of
@@ -10,14 +11,17 @@
 
 use super::block::{Block, Posing};
 use super::inputs::{Listening, listen};
-use super::tools::Tools;
+use super::tools::{DramTools, Kit, SarahTools, Tools};
 use crate::flow::{SHARED_ROWS, sample};
+use crate::frame::BLOCK_FRAMES;
 
-/// Blocks that go through the networks together, at most: two rows each is the least.
-pub(super) const MEMBERS: usize = SHARED_ROWS / 2;
+/// Blocks that go through the networks together, at most.
+pub(super) const MEMBERS: usize = 64;
+/// Of these, such as share the flow network's passes: two rows each is the least.
+pub(super) const LATENTS: usize = SHARED_ROWS / 2;
 
 /// Computes `blocks`, each into the frames of its session, or holds its last pose. Several of them
-/// are of one engine and can share passes ([`sample`]). Returns how many went through the networks.
+/// are of one engine and can share passes ([`sample`], [`steps`]). Returns how many went through the networks.
 ///
 /// Allocates nothing, takes no lock, makes no system call (`tests/sanitize.sh realtime` has the
 /// sanitizer watch this function).
@@ -29,24 +33,43 @@ pub(super) fn compute(tools: &mut Tools<'_>, blocks: &mut [Option<Block<'_>>]) -
     for block in blocks.iter_mut().flatten() {
         if block.moves() { block.begin(engine) } else { block.hold(tools) }
     }
+    match tools.kit() {
+        Kit::Sarah(mut tools) => latents(&mut tools, blocks),
+        Kit::Dram(mut tools) => steps(&mut tools, blocks),
+    }
+    let count = pose(tools, blocks);
+    blocks.iter_mut().flatten().for_each(Block::end);
+    count
+}
+
+/// Latents and what is decoded of them.
+fn latents(tools: &mut SarahTools<'_>, blocks: &mut [Option<Block<'_>>]) {
     sample(
         &mut tools.flow(),
         blocks,
-        |block| moving(block).map(Block::generator),
+        |block| moving(block).and_then(Block::generator),
         |block| {
             moving(block).into_iter().for_each(Block::evaluated);
         },
     );
     for block in blocks.iter_mut().filter_map(moving) {
-        block.take_latent(engine);
+        block.take_latent(tools);
     }
-    engine.decoder.step_all(tools.exec, &mut tools.work.vae, blocks, |block| moving(block).map(Block::decoding));
+    let decoder = &tools.model.decoder;
+    decoder.step_all(tools.exec, tools.vae, blocks, |block| moving(block).and_then(Block::decoding));
     for block in blocks.iter_mut().filter_map(moving) {
         block.decoded(tools);
     }
-    let count = pose(tools, blocks);
-    blocks.iter_mut().flatten().for_each(Block::end);
-    count
+}
+
+/// The four steps of the featherweight tier, each of all blocks.
+fn steps(tools: &mut DramTools<'_>, blocks: &mut [Option<Block<'_>>]) {
+    for frame in 0..BLOCK_FRAMES {
+        tools.model.step(tools.exec, tools.work, blocks, frame, |block| moving(block).and_then(Block::agent));
+        for (i, block) in blocks.iter_mut().filter_map(moving).enumerate() {
+            block.stepped(tools, i);
+        }
+    }
 }
 
 /// The block, if it has motion to be computed.

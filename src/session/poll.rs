@@ -10,6 +10,7 @@ use super::tools::Tools;
 use crate::clock::Instant;
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{BLOCK_FRAMES, FPS, Frame};
+use crate::normaliser::Standardised;
 use std::time::Duration;
 
 impl Session {
@@ -96,7 +97,8 @@ impl Session {
         self.take_notice();
         self.forget();
         let mut tools = Tools { exec: &mut self.exec, work: &mut self.work, engine: &self.engine };
-        self.state.reset(&mut tools, &self.options, self.engine.idle.view());
+        let idle = self.engine.sarah().map_or(Standardised::new(&[][..]), |sarah| sarah.idle.view());
+        self.state.reset(&mut tools, &self.options, idle);
         Ok(())
     }
 
@@ -128,15 +130,17 @@ impl Session {
     /// implementations.
     ///
     /// # Errors
-    /// [`ErrorKind::Argument`] when there are fewer tokens than the idle clip has.
+    /// [`ErrorKind::Argument`] when there are fewer tokens than the idle clip has, or none at all.
     #[doc(hidden)]
     pub fn reset_with_noise(&mut self, noise: Vec<f32>) -> Result<()> {
         let latent = self.engine.config.vae.latent;
-        if noise.len() < self.engine.idle.values().len() || !noise.len().is_multiple_of(latent) {
+        if noise.len() < self.engine.sarah()?.idle.values().len() || !noise.len().is_multiple_of(latent) {
             let message = format!("noise of {} values: whole tokens of {latent}, idle clip included", noise.len());
             return Err(Error::new(ErrorKind::Argument, message));
         }
-        self.state.noise = Noise::Given(noise);
+        if let Some(maker) = self.state.maker.latent() {
+            maker.noise = Noise::Given(noise);
+        }
         self.reset()
     }
 }

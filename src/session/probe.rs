@@ -11,9 +11,11 @@ use crate::frame::Frame;
 /// | `x1` | `[branches, latent]`, once per evaluation |
 /// | `latents` | `[latent]`, standardised |
 /// | `decoded` | `[4, features]`, standardised, left out where the latent was not usable |
+/// | `user_rows`, `m`, `d`, `delta`, `poses` | `[12]`, `[D]`, once per frame (kind `dram`) |
 /// | `roots` | `[4, 3]`: x, z, yaw |
 /// | `positions` | `[4, joints, 3]` |
 /// | `rotations` | `[4, joints, 4]` (x, y, z, w) |
+/// | `dyadic` | `[4, joints]` (kind `dram`) |
 pub trait Probe {
     /// One stage of block `block`.
     fn stage(&mut self, block: u64, name: &'static str, values: &[f32]);

@@ -1,6 +1,7 @@
 //! What may be set while a session runs, and the decisions that follow from it.
 
 use super::governor::{self, Decision, Governor, GovernorStats, Hold, Plan, Policy};
+use super::maker::Maker;
 use super::{Session, options};
 #[cfg(doc)]
 use crate::error::ErrorKind;
@@ -23,8 +24,9 @@ impl Session {
     }
 
     pub(super) fn apply_gaze(&mut self, target: Option<f32>) {
-        if self.options.diagnostics.gaze_control.guides(target) {
-            self.state.generator.open_gaze();
+        if let Some(maker) = self.state.maker.latent().filter(|_| self.options.diagnostics.gaze_control.guides(target))
+        {
+            maker.generator.open_gaze();
         }
         self.options.gaze = target;
     }
@@ -121,7 +123,10 @@ impl Session {
 
     pub(super) fn fresh_policy(&self) -> Option<Policy> {
         let Governor::Budget(budget) = &self.options.governor else { return None };
-        Some(Policy::new(budget, self.options.sampler, self.engine.student.is_some()))
+        Some(match &self.state.maker {
+            Maker::Latent(_) => Policy::new(budget, self.options.sampler, self.engine.has_student()),
+            Maker::Step(_) => Policy::single(budget, self.options.sampler),
+        })
     }
 
     /// The plan of the next block and its work.
@@ -136,12 +141,12 @@ impl Session {
             policy.observe(&plan, milliseconds, work);
         }
         let branches = if self.options.diagnostics.gaze_control.guides(self.options.gaze) { 3 } else { 2 };
-        let outlook = self.state.outlook(policy.ladder(), branches);
+        let outlook = self.state.maker.outlook(policy.ladder(), branches);
         let plan = policy.decide(&outlook);
         let rung = policy.ladder().iter().position(|s| *s == plan.sampler).unwrap_or(0);
         let work = match plan.hold {
             Hold::Yes => 0.0,
-            Hold::Rehearse => self.state.work.rehearsal(plan.sampler, branches),
+            Hold::Rehearse => self.state.maker.rehearsal(plan.sampler, branches),
             Hold::No => {
                 let passes = plan.catch_up.map_or(0.0, |(passes, _)| f64::from(passes));
                 let anchor = if plan.anchor { outlook.anchor } else { 0.0 };

@@ -27,7 +27,7 @@ pub struct SessionStats {
     pub governor: GovernorStats,
     /// What the plausibility guard met.
     pub guard: GuardStats,
-    /// Bytes of all key-value caches.
+    /// Bytes of all key-value caches; of the kind `dram`, of what its predictors remember.
     pub cache_bytes: usize,
 }
 

@@ -3,7 +3,8 @@
 use super::Session;
 use super::block::Block;
 use super::governor::{Hold, Plan};
-use super::pipeline::{MEMBERS, compute};
+use super::maker::Maker;
+use super::pipeline::{LATENTS, MEMBERS, compute};
 use super::tools::{Tools, Workspace};
 use crate::clock::Instant;
 use crate::engine::Engine;
@@ -17,8 +18,8 @@ use std::sync::Arc;
 /// Reading the weights is most of a block's time. Sessions whose blocks are due at the same time,
 /// and made by the same sampler with history at the same flow times, go through the flow network
 /// and the decoder side by side, in the flow network up to 16 rows per pass: four without a gaze
-/// target, two with one, eight on the single-step student. The others are computed one after the
-/// other. What each session shows has the bits that [`Session::poll`] gives.
+/// target, two with one, eight on the single-step student. Sessions of the kind `dram` go side by
+/// side, up to 64 per pass over all weights. The others are computed one after the other. What each session shows has the bits that [`Session::poll`] gives.
 ///
 /// A team has threads of its own: make the sessions with one thread.
 ///
@@ -56,7 +57,7 @@ pub(super) struct Due {
 impl Team {
     pub(crate) fn new(engine: Arc<Engine>, threads: usize) -> Result<Self> {
         let exec = engine.exec(threads)?;
-        let work = Workspace::new(&engine, MEMBERS);
+        let work = Workspace::new(&engine, MEMBERS, LATENTS);
         Ok(Self { engine, exec, work, shared: 0 })
     }
 
@@ -127,10 +128,15 @@ fn gather<'a>(sessions: &'a mut [(&mut Session, f64)]) -> Option<[Option<Block<'
         let rows = session.shared_rows(&plan);
         left = match &blocks[0] {
             // A session that shares with nobody leaves no room.
-            None => SHARED_ROWS.saturating_sub(rows.unwrap_or(SHARED_ROWS)),
+            None => session.room().saturating_sub(rows.unwrap_or(session.room())),
             Some(first) => {
-                let same = first.plan.sampler == plan.sampler
-                    && first.state.generator.alike(&session.state.generator, plan.sampler);
+                let same = match (&first.state.maker, &session.state.maker) {
+                    (Maker::Latent(a), Maker::Latent(b)) => {
+                        first.plan.sampler == plan.sampler && a.generator.alike(&b.generator, plan.sampler)
+                    }
+                    (Maker::Step(_), Maker::Step(_)) => true,
+                    _ => false,
+                };
                 match rows.and_then(|rows| left.checked_sub(rows)) {
                     Some(rest) if same && count < MEMBERS => rest,
                     _ => continue,
@@ -148,8 +154,21 @@ fn gather<'a>(sessions: &'a mut [(&mut Session, f64)]) -> Option<[Option<Block<'
 impl Session {
     /// Rows of a pass that the block of `plan` takes; `None` where it cannot share one.
     fn shared_rows(&self, plan: &Plan) -> Option<usize> {
-        let rows =
-            self.state.generator.rows(plan.sampler, self.options.diagnostics.gaze_control.guides(self.options.gaze))?;
+        let rows = match &self.state.maker {
+            Maker::Latent(maker) => {
+                let gaze = self.options.diagnostics.gaze_control.guides(self.options.gaze);
+                maker.generator.rows(plan.sampler, gaze)?
+            }
+            Maker::Step(_) => 1,
+        };
         (plan.hold == Hold::No).then_some(rows)
+    }
+
+    /// Rows that a pass has room for.
+    fn room(&self) -> usize {
+        match &self.state.maker {
+            Maker::Latent(_) => SHARED_ROWS,
+            Maker::Step(_) => MEMBERS,
+        }
     }
 }

@@ -3,13 +3,14 @@
 use super::track::{CAPACITY, Fault, fault};
 use super::{HeadTrack, TrackStats};
 use crate::queue::Queue;
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::sync::atomic::Ordering::Relaxed;
 
-/// Words of a sample: time, x and y, z.
-const WORDS: usize = 3;
+/// Words of a sample: time; pairs of x, y, z, the rotation's x, y, z, w, all zeros where there is
+/// none; and zero.
+const WORDS: usize = 5;
 /// Attempts to make room before a sample is given up: more than that many other threads are at it.
 const ATTEMPTS: usize = 8;
 
@@ -45,15 +46,23 @@ impl HeadInput {
     /// earlier, and so as long as no poll came in between. Samples that are late, not finite, or
     /// impossible are ignored and counted ([`super::TrackStats`]).
     pub fn push(&self, position: Vec3, time: f64) {
+        self.push_pose(position, None, time);
+    }
+
+    /// As [`HeadInput::push`], with the head's rotation (a quaternion of about unit length;
+    /// identity: facing +Z) where it is known. Generators that do not look at rotations make the
+    /// same motion with and without.
+    pub fn push_pose(&self, position: Vec3, rotation: Option<Quat>, time: f64) {
         let Shared { samples, non_finite, absurd, dropped } = &*self.shared;
         let count = |counter: &AtomicU64| _ = counter.fetch_add(1, Relaxed);
-        match fault(position, time) {
+        match fault(position, rotation, time) {
             Some(Fault::NonFinite) => return count(non_finite),
             Some(Fault::Absurd) => return count(absurd),
             None => {}
         }
-        let [x, y, z] = position.to_array().map(|v| u64::from(v.to_bits()));
-        let sample = [time.to_bits(), x | y << 32, z];
+        let ([x, y, z], [a, b, c, d]) = (position.to_array(), rotation.map_or([0.0; 4], |r| r.to_array()));
+        let pair = |low: f32, high: f32| u64::from(low.to_bits()) | u64::from(high.to_bits()) << 32;
+        let sample = [time.to_bits(), pair(x, y), pair(z, a), pair(b, c), pair(d, 0.0)];
         for _ in 0..ATTEMPTS {
             if samples.push(&sample) {
                 return;
@@ -74,9 +83,12 @@ impl HeadInput {
             if !self.shared.samples.pop(&mut sample) {
                 break;
             }
-            let [time, xy, z] = sample;
-            let position = [xy as u32, (xy >> 32) as u32, z as u32].map(f32::from_bits);
-            track.push(Vec3::from_array(position), f64::from_bits(time));
+            let [time, pairs @ ..] = sample;
+            let [[x, y], [z, a], [b, c], [d, _]] =
+                pairs.map(|pair| [pair as u32, (pair >> 32) as u32].map(f32::from_bits));
+            // Zeros are no rotation: what was pushed has a length.
+            let rotation = Some(Quat::from_xyzw(a, b, c, d)).filter(|r| r.length_squared() > 0.0);
+            track.push_pose(Vec3::new(x, y, z), rotation, f64::from_bits(time));
         }
     }
 
@@ -110,6 +122,18 @@ mod tests {
     use crate::user::Presence;
 
     const AT: Vec3 = Vec3::new(0.0, 1.6, 2.0);
+
+    #[test]
+    fn rotations_get_through() {
+        let (input, mut t) = (HeadInput::new(), HeadTrack::new());
+        let turned = Quat::from_rotation_x(0.3);
+        input.push_pose(AT, Some(turned), 0.0);
+        input.push_pose(AT, None, 0.1);
+        input.push_pose(AT, Some(Quat::NAN), 0.2);
+        input.drain(&mut t);
+        assert_eq!([0.0, 0.1].map(|time| t.sample(time, 1.0).rotation), [Some(turned.normalize()), None]);
+        assert_eq!(input.stats(&t), TrackStats { accepted: 2, non_finite: 1, ..Default::default() });
+    }
 
     #[test]
     fn an_input_may_be_pushed_into_from_several_threads() {

@@ -2,7 +2,7 @@
 
 use super::{HOLD_SECONDS, MAX_DISTANCE, TELEPORT_SPEED};
 use crate::frame::{BLOCK_FRAMES, FPS};
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use std::collections::VecDeque;
 
 /// Samples that a [`HeadTrack::new`] keeps: 68 s at 120 Hz.
@@ -32,6 +32,8 @@ pub struct UserSample {
     pub presence: Presence,
     /// Head position in the world, metres; zero when absent.
     pub position: Vec3,
+    /// Head rotation in the world (identity: facing +Z), where it is known.
+    pub rotation: Option<Quat>,
 }
 
 /// What became of the samples that were pushed.
@@ -39,12 +41,13 @@ pub struct UserSample {
 pub struct TrackStats {
     /// Taken.
     pub accepted: u64,
-    /// Ignored: NaN or infinity in the position or the time.
+    /// Ignored: NaN or infinity in the position, the rotation or the time.
     pub non_finite: u64,
     /// Ignored: late (a block has used a sample of that time or of a later one), or at the time of
     /// another sample.
     pub out_of_order: u64,
-    /// Ignored: more than 1 km from the origin, or a time of more than 10 million seconds.
+    /// Ignored: more than 1 km from the origin, a time of more than 10 million seconds, or a
+    /// rotation whose length is not within 0.5 to 2.
     pub absurd: u64,
     /// Taken, but too far from the sample before to have walked there; the way between is not
     /// filled in.
@@ -57,8 +60,15 @@ pub struct TrackStats {
 struct Sample {
     time: f64,
     position: Vec3,
+    rotation: Option<Quat>,
     /// Not reached by walking from the sample before.
     jump: bool,
+}
+
+impl Sample {
+    fn known(&self, presence: Presence) -> UserSample {
+        UserSample { presence, position: self.position, rotation: self.rotation }
+    }
 }
 
 /// Why a sample is of no use, whatever came before it.
@@ -67,12 +77,13 @@ pub(super) enum Fault {
     Absurd,
 }
 
-pub(super) fn fault(position: Vec3, time: f64) -> Option<Fault> {
-    if !position.is_finite() || !time.is_finite() {
+pub(super) fn fault(position: Vec3, rotation: Option<Quat>, time: f64) -> Option<Fault> {
+    if !position.is_finite() || !time.is_finite() || rotation.is_some_and(|r| !r.is_finite()) {
         return Some(Fault::NonFinite);
     }
     // Squares of absurd positions overflow to infinity, which is refused as well.
-    let absurd = position.length_squared() > MAX_DISTANCE * MAX_DISTANCE || time.abs() > MAX_TIME;
+    let turned = rotation.is_none_or(|r| (0.25..=4.0).contains(&r.length_squared()));
+    let absurd = position.length_squared() > MAX_DISTANCE * MAX_DISTANCE || time.abs() > MAX_TIME || !turned;
     absurd.then_some(Fault::Absurd)
 }
 
@@ -114,8 +125,15 @@ impl HeadTrack {
     /// Adds a head position (world, metres, within 1 km) at `time` (session time, seconds), which
     /// is later than all samples that were used and is no other sample's. What does not fit that is
     /// ignored and counted, see [`TrackStats`].
+    #[cfg_attr(not(feature = "internals"), allow(dead_code, reason = "sessions push poses"))]
     pub fn push(&mut self, position: Vec3, time: f64) {
-        match fault(position, time) {
+        self.push_pose(position, None, time);
+    }
+
+    /// As [`HeadTrack::push`], with the head's rotation where it is known: any quaternion of about
+    /// unit length.
+    pub fn push_pose(&mut self, position: Vec3, rotation: Option<Quat>, time: f64) {
+        match fault(position, rotation, time) {
             Some(Fault::NonFinite) => return self.stats.non_finite += 1,
             Some(Fault::Absurd) => return self.stats.absurd += 1,
             None => {}
@@ -142,7 +160,8 @@ impl HeadTrack {
             at -= 1;
         }
         self.stats.accepted += 1;
-        self.samples.insert(at, Sample { time, position, jump: false });
+        let rotation = rotation.map(Quat::normalize);
+        self.samples.insert(at, Sample { time, position, rotation, jump: false });
         self.judge(at);
         self.judge(at + 1);
     }
@@ -160,7 +179,7 @@ impl HeadTrack {
 
     /// The head at `time` (session seconds), as known at `now`: linear between neighbours, both no
     /// later than `now`, unless they are more than half a second or a teleport apart; else the last
-    /// one before, for half a second.
+    /// one before, for half a second. Between a rotation and none there is none.
     pub fn sample(&mut self, time: f64, now: f64) -> UserSample {
         if now > self.asked {
             self.asked = now;
@@ -178,7 +197,7 @@ impl HeadTrack {
         }
         let before = self.samples[after - 1];
         if before.time == time {
-            return UserSample { presence: Presence::Measured, position: before.position };
+            return before.known(Presence::Measured);
         }
         if after < self.samples.len() {
             let next = self.samples[after];
@@ -186,11 +205,12 @@ impl HeadTrack {
             if next.time <= now && gap <= HOLD_SECONDS && !next.jump {
                 let part = ((time - before.time) / gap) as f32;
                 let position = before.position.lerp(next.position, part);
-                return UserSample { presence: Presence::Measured, position };
+                let rotation = before.rotation.zip(next.rotation).map(|(a, b)| a.lerp(b, part));
+                return UserSample { presence: Presence::Measured, position, rotation };
             }
         }
         if time - before.time <= HOLD_SECONDS {
-            return UserSample { presence: Presence::Held, position: before.position };
+            return before.known(Presence::Held);
         }
         UserSample::default()
     }

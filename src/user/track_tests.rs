@@ -14,14 +14,14 @@ fn track(samples: &[(f32, f64)]) -> HeadTrack {
 }
 
 fn measured(x: f32) -> UserSample {
-    UserSample { presence: Presence::Measured, position: at(x) }
+    UserSample { presence: Presence::Measured, position: at(x), rotation: None }
 }
 
 fn held(x: f32) -> UserSample {
-    UserSample { presence: Presence::Held, position: at(x) }
+    UserSample { presence: Presence::Held, position: at(x), rotation: None }
 }
 
-const ABSENT: UserSample = UserSample { presence: Presence::Absent, position: Vec3::ZERO };
+const ABSENT: UserSample = UserSample { presence: Presence::Absent, position: Vec3::ZERO, rotation: None };
 
 #[test]
 fn between_samples_is_linear_and_after_them_held_then_absent() {
@@ -51,7 +51,7 @@ fn teleports_are_counted_and_not_walked() {
     let mut t = track(&[(0.0, 0.0), (4.0, 0.1), (4.1, 0.2)]);
     assert_eq!(t.sample(0.05, 1.0), held(0.0));
     assert_eq!(t.sample(0.1, 1.0), measured(4.0));
-    assert_eq!(t.sample(0.15, 1.0), UserSample { presence: Presence::Measured, position: at(4.0).lerp(at(4.1), 0.5) });
+    assert_eq!(t.sample(0.15, 1.0), UserSample { position: at(4.0).lerp(at(4.1), 0.5), ..measured(0.0) });
     assert_eq!(t.stats(), TrackStats { accepted: 3, teleports: 1, ..Default::default() });
     // 11.9 m/s is running; and 5 mm within 0.1 ms is jitter.
     assert_eq!(track(&[(0.0, 0.0), (0.119, 0.01), (0.124, 0.0101)]).stats().teleports, 0);
@@ -96,6 +96,22 @@ fn what_has_not_been_used_is_sorted_and_what_is_late_counted() {
     let mut t = track(&[(0.0, 0.0), (2.0, 0.02), (1.0, 0.01)]);
     t.push(at(2.0), 0.5);
     assert_eq!((t.stats().teleports, t.sample(0.015, 1.0)), (2, held(1.0)));
+}
+
+#[test]
+fn rotations_go_with_their_positions() {
+    let mut t = HeadTrack::new();
+    let turned = |angle: f32| Quat::from_rotation_y(angle);
+    t.push_pose(at(0.0), Some(turned(0.0)), 0.0);
+    t.push_pose(at(0.0), Some(-turned(0.2) * 1.5), 0.1);
+    t.push(at(0.0), 0.2);
+    let angle = |sample: UserSample| sample.rotation.map(|r| 2.0 * libm::atan2f(r.y, r.w));
+    assert!((angle(t.sample(0.05, 1.0)).unwrap() - 0.1).abs() < 1e-4, "the shorter way, of unit length");
+    assert!(t.sample(0.1, 1.0).rotation.unwrap().is_normalized());
+    assert_eq!([0.15, 0.2, 0.6].map(|time| t.sample(time, 1.0).rotation), [None; 3]);
+    t.push_pose(at(0.0), Some(Quat::from_xyzw(f32::NAN, 0.0, 0.0, 1.0)), 1.1);
+    t.push_pose(at(0.0), Some(Quat::from_xyzw(0.0, 0.0, 0.0, 0.0)), 1.1);
+    assert_eq!(t.stats(), TrackStats { accepted: 3, non_finite: 1, absurd: 1, ..Default::default() });
 }
 
 #[test]

@@ -21,10 +21,17 @@ pub(super) struct Parts {
 
 impl Parts {
     pub(super) fn tiny() -> Self {
-        let bytes = tiny_bytes();
-        let (_, header) = SafeTensors::read_metadata(&bytes).unwrap();
+        Self::of(&tiny_bytes())
+    }
+
+    fn dram(backbone: &str) -> Self {
+        Self::of(&std::fs::read(golden_path(&format!("dram-{backbone}.safetensors"))).expect("the tiny bundle"))
+    }
+
+    fn of(bytes: &[u8]) -> Self {
+        let (_, header) = SafeTensors::read_metadata(bytes).unwrap();
         let config = serde_json::from_str(&header.metadata().as_ref().unwrap()[CONFIG_KEY]).unwrap();
-        let file = SafeTensors::deserialize(&bytes).unwrap();
+        let file = SafeTensors::deserialize(bytes).unwrap();
         let tensors = file.iter().map(|(n, v)| (n.to_owned(), (v.dtype(), v.shape().to_vec(), v.data().to_vec())));
         Self { config, tensors: tensors.collect() }
     }
@@ -227,4 +234,82 @@ fn a_bundle_inside_another_file() {
     assert_eq!(kind(offset + 1, length), ErrorKind::BundleCorrupt);
     assert_eq!(kind(offset, length - 1), ErrorKind::BundleCorrupt);
     std::fs::remove_file(&path).unwrap();
+}
+
+/// The kind `dram`: ranges, shapes, what is missing or too much, and numbers that are none.
+#[test]
+fn featherweight_bundles_are_checked_as_strictly() {
+    let refuse = |backbone: &str, kind: ErrorKind, part: &str, change: &dyn Fn(&mut Parts)| {
+        let mut parts = Parts::dram(backbone);
+        change(&mut parts);
+        let e = refused(parts.bytes());
+        assert!(e.kind() == kind && e.to_string().contains(part), "{backbone}: expected `{part}`: {e}");
+    };
+    let set = |path: &'static str, value: serde_json::Value| {
+        move |parts: &mut Parts| *parts.config.pointer_mut(path).expect("it is there") = value.clone()
+    };
+    use ErrorKind::{BundleCorrupt, BundleInvalid};
+    for backbone in ["tcn", "lstm"] {
+        Engine::from_bytes(Parts::dram(backbone).bytes(), NAME).unwrap();
+        for (kind, part, path, value) in [
+            (BundleInvalid, "unknown variant `mospa`", "/kind", "mospa".into()),
+            (BundleInvalid, "missing field", "/kind", "sarah".into()),
+            (BundleInvalid, "monadic.width is 0", "/dram/monadic/width", 0.into()),
+            (BundleInvalid, "dyadic.width is 70000", "/dram/dyadic/width", 70_000.into()),
+            (BundleInvalid, "has shape", "/dram/dyadic/width", 7.into()),
+            (BundleInvalid, "unknown variant", "/dram/backbone", "gru".into()),
+            (BundleInvalid, "user_delay_blocks is 2", "/user_delay_blocks", 2.into()),
+            (BundleInvalid, "agent_delay_blocks is 1", "/agent_delay_blocks", 1.into()),
+            (BundleInvalid, "session.bridge is -1", "/session/bridge", (-1).into()),
+        ] {
+            refuse(backbone, kind, part, &set(path, value));
+        }
+        refuse(backbone, BundleInvalid, "invalid type", &set("/dram", serde_json::json!("no")));
+        refuse(backbone, BundleInvalid, "missing field `dram`", &|parts| {
+            parts.config.as_object_mut().unwrap().remove("dram");
+        });
+        for name in ["stats.step_std", "idle.frames", "monadic.into.weight", "dyadic.out.bias"] {
+            refuse(backbone, BundleInvalid, &format!("tensor {name} is missing"), &|parts| {
+                parts.tensors.remove(name);
+            });
+            refuse(backbone, BundleCorrupt, &format!("tensor {name} holds NaN"), &|parts| {
+                let (dtype, _, data) = parts.tensors.get_mut(name).unwrap();
+                let nan = if *dtype == Dtype::F16 { vec![0x00, 0x7e] } else { f32::NAN.to_le_bytes().to_vec() };
+                data[..nan.len()].copy_from_slice(&nan);
+            });
+        }
+        refuse(backbone, BundleInvalid, "deviations are positive", &|parts| parts.f32("stats.step_std", &[136], 0.0));
+        refuse(backbone, BundleInvalid, "idle.frames has 1 frames", &|parts| parts.f32("idle.frames", &[1, 136], 0.1));
+        refuse(backbone, BundleInvalid, "more the first", &|parts| parts.f32("more", &[2], 0.0));
+    }
+    refuse("tcn", BundleInvalid, "dilations is 0", &set("/dram/monadic/dilations", serde_json::json!([1, 0, 4])));
+    refuse("tcn", BundleInvalid, "dilations is 5000", &set("/dram/monadic/dilations", serde_json::json!([1, 2, 5000])));
+    refuse("tcn", BundleInvalid, "unknown field", &|parts| parts.config["dram"]["monadic"]["layers"] = 3.into());
+    refuse("lstm", BundleInvalid, "layers is 99", &set("/dram/dyadic/layers", 99.into()));
+    changed(BundleInvalid, "its networks are not", |parts| {
+        parts.config["dram"] = Parts::dram("tcn").config["dram"].clone()
+    });
+}
+
+/// Predictors whose numbers run away: the guard answers, and what comes out stays finite.
+#[test]
+fn featherweight_weights_that_overflow_are_guarded() {
+    for backbone in ["tcn", "lstm"] {
+        let mut parts = Parts::dram(backbone);
+        parts.f32("stats.step_std", &[136], 1e30);
+        let engine = Engine::from_bytes(parts.bytes(), NAME).unwrap();
+        let mut session = engine.session(SessionOptions::default()).unwrap();
+        for _ in 0..20 {
+            let frames = session.poll(session.next_due()).unwrap().unwrap();
+            for frame in frames {
+                assert!(frame.global.iter().all(|t| t.position.is_finite() && t.rotation.is_finite()));
+                assert!(frame.dyadic.iter().all(|share| (0.0..=1.0).contains(share)));
+            }
+        }
+        assert!(session.stats().guard.trips > 0);
+        let unguarded = SessionOptions { guard: false, stance: false, ..Default::default() };
+        let mut session = engine.session(unguarded).unwrap();
+        let outcomes = (0..20).map(|_| session.poll(session.next_due()).map(drop).map_err(|e| e.kind()));
+        assert!(outcomes.into_iter().all(|o| o.is_ok() || o == Err(ErrorKind::State)));
+    }
 }

@@ -23,9 +23,27 @@ pub fn tiny() -> Arc<Engine> {
     Engine::load(golden_path("tiny.safetensors")).expect("the tiny bundle loads")
 }
 
+/// The tiny bundle of the featherweight tier with the backbone `tcn` or `lstm`.
+pub fn dram(backbone: &str) -> Arc<Engine> {
+    Engine::load(golden_path(&format!("dram-{backbone}.safetensors"))).expect("the tiny bundle loads")
+}
+
+/// The same with all matrices at `scheme` that can be.
+pub fn dram_in(backbone: &str, scheme: Scheme) -> Arc<Engine> {
+    let file = widened(&golden_path(&format!("dram-{backbone}.safetensors")));
+    let options = Options { scheme, smallest: 0, keep: &[], calibration: None, budget: None };
+    let quantised = quantise(&file, &options).expect("it can be quantised");
+    Engine::from_bytes(quantised.bytes, "tiny").expect("the result loads")
+}
+
 /// The tiny bundle in f32, with weights that f16 does not hold.
 pub fn tiny_f32() -> BundleFile<'static> {
-    let bytes = std::fs::read(golden_path("tiny.safetensors")).expect("the tiny bundle is there");
+    widened(&golden_path("tiny.safetensors"))
+}
+
+/// A bundle of half floats in f32, with weights that f16 does not hold.
+fn widened(path: &Path) -> BundleFile<'static> {
+    let bytes = std::fs::read(path).expect("the tiny bundle is there");
     let (_, header) = SafeTensors::read_metadata(&bytes).expect("a header");
     let file = SafeTensors::deserialize(&bytes).expect("a sound container");
     let widen = |view: &TensorView<'_>| -> Vec<u8> {
@@ -56,7 +74,11 @@ pub struct Golden(Vec<u8>);
 
 impl Golden {
     pub fn load() -> Self {
-        Self(std::fs::read(golden_path("tiny-golden.safetensors")).expect("the golden file is there"))
+        Self::named("tiny-golden.safetensors")
+    }
+
+    pub fn named(name: &str) -> Self {
+        Self(std::fs::read(golden_path(name)).expect("the golden file is there"))
     }
 
     /// A tensor's shape and values; i16 audio is scaled to 1.

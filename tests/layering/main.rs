@@ -28,10 +28,11 @@ const ROOMS: &[(&str, &str, &[&str])] = &[
     ("bundle", "the model file", &["audio", "bounded", "config", "error", "frame", "kernels"]),
     ("vae", "motion to latents and back", &["bundle", "config", "error", "frame", "kernels", "nn", "normaliser"]),
     ("flow", "noise to latents", &["bundle", "config", "error", "frame", "kernels", "nn", "normaliser"]),
+    ("dram", "steps of the featherweight tier", &["bundle", "config", "error", "frame", "kernels", "rig"]),
     (
         "engine",
         "a loaded bundle",
-        &["audio", "bundle", "config", "error", "flow", "frame", "kernels", "normaliser", "pose", "rig", "vae"],
+        &["audio", "bundle", "config", "dram", "error", "flow", "frame", "kernels", "normaliser", "pose", "rig", "vae"],
     ),
     (
         "session",
@@ -40,6 +41,7 @@ const ROOMS: &[(&str, &str, &[&str])] = &[
             "audio",
             "clock",
             "config",
+            "dram",
             "engine",
             "error",
             "flow",

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use std::fmt;
 use visavis::internals::bundle::TensorInfo;
-use visavis::internals::config::Config;
+use visavis::internals::config::{Config, DramConfig, LstmConfig, TcnConfig};
 use visavis::internals::kernels::Scheme;
 use visavis::{BundleFile, Result};
 
@@ -19,12 +19,14 @@ pub struct Contents {
 }
 
 /// Parts of a bundle: name prefix and what it is.
-const PARTS: [(&str, &str); 7] = [
+const PARTS: [(&str, &str); 9] = [
     ("audio.", "audio encoder"),
     ("vae.encoder.", "VAE encoder"),
     ("vae.decoder.", "VAE decoder"),
     ("flow.", "flow transformer"),
     ("student.", "single-step student"),
+    ("monadic.", "monadic predictor"),
+    ("dyadic.", "dyadic predictor"),
     ("stats.", "normalisation"),
     ("idle.", "idle clip"),
 ];
@@ -71,41 +73,9 @@ impl fmt::Display for Contents {
             stack.join(" "),
             c.audio.features
         )?;
-        let v = &c.vae;
-        writeln!(
-            f,
-            "  VAE      {} + {} layers of width {}, {} heads, latent {}, window {} blocks",
-            v.layers, v.layers, v.width, v.heads, v.latent, v.window_blocks
-        )?;
-        let w = &c.flow;
-        writeln!(
-            f,
-            "  flow     {} layers of width {}, {} heads, window {} blocks ({:.1} s)",
-            w.layers,
-            w.width,
-            w.heads,
-            w.window_blocks,
-            w.window_blocks as f64 * 4.0 / 30.0
-        )?;
-        match c.student {
-            Some(s) => writeln!(
-                f,
-                "  student  single step, history at tau {}, guidance {} and gaze guidance {} distilled in",
-                s.tau_history, s.guidance, s.gaze_guidance
-            )?,
-            None => writeln!(f, "  student  none: the sampler \"single\" is not available")?,
-        }
-        match &c.gaze {
-            Some(g) => writeln!(
-                f,
-                "  gaze     calibrated; free gaze {:.2} to {:.2} in stretches of {:.1} s",
-                g.levels.iter().copied().fold(f32::INFINITY, f32::min),
-                g.levels.iter().copied().fold(f32::NEG_INFINITY, f32::max),
-                g.seconds
-            )?,
-            None => {
-                writeln!(f, "  gaze     not calibrated: targets are values of the gaze channel (`visavis calibrate`)")?
-            }
+        match &c.dram {
+            None => networks(c, f)?,
+            Some(dram) => predictors(dram, f)?,
         }
         writeln!(
             f,
@@ -115,6 +85,62 @@ impl fmt::Display for Contents {
         writeln!(f, "  rig      {} joints: {}", c.rig.joints.len(), joint_list(c))?;
         writeln!(f, "\n  licence  {}", c.licence)
     }
+}
+
+/// The predictors of the kind `dram`.
+fn predictors(dram: &DramConfig, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let tcn = |c: &TcnConfig| {
+        let frames = c.dilations.iter().sum::<usize>() + 1;
+        let layers = c.dilations.len();
+        format!("{layers} dilated layers of width {}, window {frames} frames ({:.1} s)", c.width, frames as f64 / 30.0)
+    };
+    let lstm = |c: &LstmConfig| format!("{} LSTM layers of width {}", c.layers, c.width);
+    let [monadic, dyadic] = match dram {
+        DramConfig::Tcn { monadic, dyadic } => [tcn(monadic), tcn(dyadic)],
+        DramConfig::Lstm { monadic, dyadic } => [lstm(monadic), lstm(dyadic)],
+    };
+    writeln!(f, "  monadic  {monadic}")?;
+    writeln!(f, "  dyadic   {dyadic}")?;
+    writeln!(f, "  steps    a frame each, deterministic: no samplers, guidance or calibration")
+}
+
+/// The networks of the kind `sarah`.
+fn networks(c: &Config, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let v = &c.vae;
+    writeln!(
+        f,
+        "  VAE      {} + {} layers of width {}, {} heads, latent {}, window {} blocks",
+        v.layers, v.layers, v.width, v.heads, v.latent, v.window_blocks
+    )?;
+    let w = &c.flow;
+    writeln!(
+        f,
+        "  flow     {} layers of width {}, {} heads, window {} blocks ({:.1} s)",
+        w.layers,
+        w.width,
+        w.heads,
+        w.window_blocks,
+        w.window_blocks as f64 * 4.0 / 30.0
+    )?;
+    match c.student {
+        Some(s) => writeln!(
+            f,
+            "  student  single step, history at tau {}, guidance {} and gaze guidance {} distilled in",
+            s.tau_history, s.guidance, s.gaze_guidance
+        )?,
+        None => writeln!(f, "  student  none: the sampler \"single\" is not available")?,
+    }
+    match &c.gaze {
+        Some(g) => writeln!(
+            f,
+            "  gaze     calibrated; free gaze {:.2} to {:.2} in stretches of {:.1} s",
+            g.levels.iter().copied().fold(f32::INFINITY, f32::min),
+            g.levels.iter().copied().fold(f32::NEG_INFINITY, f32::max),
+            g.seconds
+        )?,
+        None => writeln!(f, "  gaze     not calibrated: targets are values of the gaze channel (`visavis calibrate`)")?,
+    }
+    Ok(())
 }
 
 fn joint_list(config: &Config) -> String {

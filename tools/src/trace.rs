@@ -66,9 +66,10 @@ pub struct Trace {
 /// [`SessionOptions::stance`] off.
 ///
 /// # Errors
-/// [`ErrorKind::Argument`] for options that the bundle cannot do, [`ErrorKind::Audio`] for voices
+/// [`ErrorKind::Argument`] for options that the bundle cannot do, and one of another kind than `sarah`, [`ErrorKind::Audio`] for voices
 /// that are not finite.
 pub fn trace(engine: &Arc<Engine>, input: &TraceInput, options: SessionOptions) -> Result<Trace> {
+    engine.needs_sarah()?;
     let diagnostics = Diagnostics { gaze_control: GazeControl::Channel, ..options.diagnostics };
     let mut session = engine.session(SessionOptions { gaze: input.gaze, diagnostics, ..options })?;
     if let Some(noise) = &input.noise {

@@ -11,7 +11,7 @@ use jni::sys::{jboolean, jdouble, jfloat, jint, jlong};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU32;
 use std::sync::atomic::Ordering::Relaxed;
-use visavis::glam::Vec3;
+use visavis::glam::{Quat, Vec3};
 use visavis::{BLOCK_FRAMES, Frame, Governor, Root, Session, SessionOptions, SharedSession, Speaker, VoiceInput};
 
 pub(crate) static SESSIONS: Table<SharedSession> = Table::new("session");
@@ -33,6 +33,10 @@ native!("Java_org_visavis_Native_finishVoice": finish_voice(session: jlong, voic
 native!("Java_org_visavis_Native_clearVoice": clear_voice(session: jlong, voice: jint));
 native!("Java_org_visavis_Native_setVoicePresent": set_voice_present(session: jlong, voice: jint, present: jboolean));
 native!("Java_org_visavis_Native_pushHead": push_head(session: jlong, x: jfloat, y: jfloat, z: jfloat, time: jdouble));
+native!("Java_org_visavis_Native_pushPose": push_pose(
+    session: jlong, x: jfloat, y: jfloat, z: jfloat, qx: jfloat, qy: jfloat, qz: jfloat, qw: jfloat, time: jdouble
+));
+native!("Java_org_visavis_Native_dyadic": dyadic(session: jlong, out: jfloat[], offset: jint) -> jint);
 native!("Java_org_visavis_Native_setGaze": set_gaze(session: jlong, target: jfloat));
 native!("Java_org_visavis_Native_setNaturalGaze": set_natural_gaze(session: jlong));
 native!("Java_org_visavis_Native_setGuidance": set_guidance(session: jlong, weight: jfloat, gaze: jfloat));
@@ -178,6 +182,47 @@ fn push_head<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, x: f32, y: f32,
     around(session, |shared| {
         shared.head().push(Vec3::new(x, y, z), time);
         Ok(())
+    })
+}
+
+#[allow(clippy::too_many_arguments, reason = "numbers of a pose, one by one as Java has them")]
+fn push_pose<'l>(
+    _: &mut Env<'l>,
+    _: JClass<'l>,
+    session: jlong,
+    x: f32,
+    y: f32,
+    z: f32,
+    qx: f32,
+    qy: f32,
+    qz: f32,
+    qw: f32,
+    time: f64,
+) -> Outcome {
+    around(session, |shared| {
+        shared.head().push_pose(Vec3::new(x, y, z), Some(Quat::from_xyzw(qx, qy, qz, qw)), time);
+        Ok(())
+    })
+}
+
+/// Writes how much each joint follows the user in the last block's frames; returns how many numbers
+/// those are, 0 where the bundle has no such read-out.
+fn dyadic<'l>(env: &mut Env<'l>, _: JClass<'l>, session: jlong, out: JFloatArray<'l>, offset: jint) -> Outcome<jint> {
+    if out.is_null() {
+        return Err(jni::errors::Error::NullPtr("out is null").into());
+    }
+    let there = out.len(env)?;
+    with(session, |s| {
+        let shares = || s.frames().into_iter().flatten().flat_map(|frame| &frame.dyadic);
+        let (needed, room) = (shares().count(), there.saturating_sub(usize::try_from(offset).unwrap_or(there)));
+        if room < needed {
+            return Err(Failure::Argument(format!("room for {room} floats, but a block has {needed} shares")));
+        }
+        with_scratch(needed, |scratch| {
+            scratch.iter_mut().zip(shares()).for_each(|(to, share)| *to = *share);
+            out.set_region(env, offset, scratch)?;
+            Ok(needed as jint)
+        })
     })
 }
 

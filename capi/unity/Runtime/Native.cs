@@ -35,6 +35,8 @@ namespace Visavis
         [DllImport(Library)] public static extern Status visavis_session_clear_audio(SessionHandle session, int voice);
         [DllImport(Library)] public static extern Status visavis_session_set_audio_present(SessionHandle session, int voice, int present);
         [DllImport(Library)] public static extern Status visavis_session_push_user_head(SessionHandle session, float x, float y, float z, double time);
+        [DllImport(Library)] public static extern Status visavis_session_push_user_pose(SessionHandle session, float x, float y, float z, float qx, float qy, float qz, float qw, double time);
+        [DllImport(Library)] public static extern Status visavis_session_dyadic(SessionHandle session, [Out] float[] shares, UIntPtr capacity, out UIntPtr count);
         [DllImport(Library)] public static extern Status visavis_session_set_gaze(SessionHandle session, float target);
         [DllImport(Library)] public static extern Status visavis_session_set_natural_gaze(SessionHandle session);
         [DllImport(Library)] public static extern Status visavis_session_set_guidance(SessionHandle session, float weight, float gaze);

@@ -77,6 +77,10 @@ namespace Visavis
         /// <summary>Where the midpoint of the user's eyes is, session world. Late and impossible positions are ignored and counted.</summary>
         public void PushUserHead(float x, float y, float z, double time) => Errors.Check(Native.visavis_session_push_user_head(handle, x, y, z, time));
 
+        /// <summary>The same with the head's rotation: a quaternion of about unit length, identity where the user faces +Z. Bundles of the kind `dram` see it.</summary>
+        public void PushUserPose(float x, float y, float z, float qx, float qy, float qz, float qw, double time) =>
+            Errors.Check(Native.visavis_session_push_user_pose(handle, x, y, z, qx, qy, qz, qw, time));
+
         /// <summary>0 averted to 1 sustained eye contact; null: what comes naturally.</summary>
         public void SetGaze(float? target) =>
             Errors.Check(target.HasValue ? Native.visavis_session_set_gaze(handle, target.Value) : Native.visavis_session_set_natural_gaze(handle));
@@ -97,6 +101,16 @@ namespace Visavis
         {
             Errors.Check(Native.visavis_session_poll(handle, now, Frames, (UIntPtr)Marshal.SizeOf(typeof(Frame)), Joints, (UIntPtr)Joints.Length, out var count));
             return count > 0;
+        }
+
+        /// <summary>
+        /// How much each joint of the last block's frames follows the user rather than the agent's own voice and habit, 0 to 1, into room for
+        /// Joints.Length numbers. Returns how many those are: 0 before the first block and with bundles of another kind than `dram`.
+        /// </summary>
+        public int Dyadic(float[] shares)
+        {
+            Errors.Check(Native.visavis_session_dyadic(handle, shares, (UIntPtr)(shares?.Length ?? 0), out var count));
+            return (int)count;
         }
 
         /// <summary>Session time at which the next block is due, seconds.</summary>

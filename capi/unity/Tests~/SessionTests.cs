@@ -74,6 +74,7 @@ namespace Visavis.Tests
             // Ignored and counted, not refused.
             session.PushUserHead(float.NaN, 0, 0, 1);
             session.PushUserHead(0, 1.6f, 1, double.PositiveInfinity);
+            session.PushUserPose(0, 1.6f, 1.5f, 0, 0, 0, 1, 0);
             session.SetGaze(null);
             session.SetGaze(1);
             session.SetGuidance(1.3f, 2);
@@ -86,6 +87,7 @@ namespace Visavis.Tests
             Check.That(session.Poll(session.NextDue()), "a block after all that");
             foreach (var joint in session.Joints)
                 Check.That(!float.IsNaN(joint.PositionX + joint.LocalW + joint.RotationX), "frames are finite");
+            Check.That(session.Dyadic(new float[session.Joints.Length]) == 0, "the flow model tells of no shares");
             Check.That(session.Statistics().HeadNonFinite == after.HeadNonFinite + 2, "heads that are no number are counted");
         }
 

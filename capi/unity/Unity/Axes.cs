@@ -11,5 +11,8 @@ namespace Visavis.Unity
 
         /// <summary>A position of Unity in the session's axes.</summary>
         public static Vector3 ToSession(Vector3 position) => new Vector3(-position.x, position.y, position.z);
+
+        /// <summary>A rotation of Unity in the session's axes.</summary>
+        public static Quaternion ToSession(Quaternion rotation) => new Quaternion(rotation.x, -rotation.y, -rotation.z, rotation.w);
     }
 }

@@ -143,7 +143,8 @@ namespace Visavis.Unity
                 if (head != null)
                 {
                     var eyes = Axes.ToSession(transform.InverseTransformPoint(head.position));
-                    session.PushUserHead(eyes.x, eyes.y, eyes.z, SessionTime);
+                    var facing = Axes.ToSession(Quaternion.Inverse(transform.rotation) * head.rotation);
+                    session.PushUserPose(eyes.x, eyes.y, eyes.z, facing.x, facing.y, facing.z, facing.w, SessionTime);
                 }
                 if (gaze != shownGaze) session.SetGaze((shownGaze = gaze) < 0 ? (float?)null : gaze);
                 if (budget != shownBudget) session.SetBudget((shownBudget = budget) < 1 ? 0 : budget);

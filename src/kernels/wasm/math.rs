@@ -94,3 +94,27 @@ fn over<const N: usize>(x: [v128; N], mut e: [v128; N]) -> [v128; N] {
     }
     e
 }
+
+/// 1 / (1 + e^-x).
+#[inline(always)]
+pub(in crate::kernels) fn sigmoid<L: Madd, const N: usize>(level: L, x: [v128; N]) -> [v128; N] {
+    let mut negative = x;
+    for i in 0..N {
+        negative[i] = f32x4_neg(x[i]);
+    }
+    over([f32x4_splat(1.0); N], exp(level, negative))
+}
+
+/// tanh x as 2 / (1 + e^(-2x)) - 1.
+#[inline(always)]
+pub(in crate::kernels) fn tanh<L: Madd, const N: usize>(level: L, x: [v128; N]) -> [v128; N] {
+    let mut argument = x;
+    for i in 0..N {
+        argument[i] = f32x4_mul(f32x4_splat(-2.0), x[i]);
+    }
+    let mut y = over([f32x4_splat(2.0); N], exp(level, argument));
+    for i in 0..N {
+        y[i] = f32x4_sub(y[i], f32x4_splat(1.0));
+    }
+    y
+}

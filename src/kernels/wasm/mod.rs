@@ -14,7 +14,7 @@ mod math;
 #[cfg(target_feature = "relaxed-simd")]
 mod relaxed;
 
-pub(super) use math::{each, exp, gelu, silu};
+pub(super) use math::{each, exp, gelu, sigmoid, silu, tanh};
 
 /// Multiply-adds of floats, on a level's token.
 pub(super) trait Madd: Copy {

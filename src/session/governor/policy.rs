@@ -94,6 +94,11 @@ impl Policy {
         }
     }
 
+    /// One rung alone, of a generator without samplers: it moves or is held.
+    pub(in crate::session) fn single(budget: &Budget, sampler: Sampler) -> Self {
+        Self { len: 1, rung: 0, ..Self::new(budget, sampler, false) }
+    }
+
     /// The same with counters that go on.
     pub(in crate::session) fn with_stats(mut self, stats: GovernorStats) -> Self {
         self.stats = stats;

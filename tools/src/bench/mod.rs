@@ -57,7 +57,7 @@ impl Default for BenchOptions {
 pub struct Bench {
     /// Name of the model.
     pub model: String,
-    /// Sampler.
+    /// Sampler; the kind of bundles without any.
     pub sampler: String,
     /// Threads.
     pub threads: usize,
@@ -91,8 +91,10 @@ pub struct Bench {
     pub first_frame_ms: f64,
     /// Bytes of all packed weights.
     pub weight_bytes: usize,
-    /// Bytes of the sessions' caches.
+    /// Bytes of the sessions' caches; of the kind `dram`, of what its predictors remember.
     pub cache_bytes: usize,
+    /// The same of one session.
+    pub state_bytes_a_session: usize,
     /// Memory of this process that is resident after the timed blocks, bytes, where the system
     /// tells.
     pub resident_bytes: Option<u64>,
@@ -143,7 +145,7 @@ impl Bench {
         let (rate, limit) = (bytes as f64 / median / 1e6, read_limit(threads));
         Ok(Self {
             model: engine.config().name.clone(),
-            sampler: sampler.to_string(),
+            sampler: if engine.needs_sarah().is_ok() { sampler.to_string() } else { engine.kind().to_owned() },
             threads,
             sessions,
             blocks,
@@ -160,6 +162,7 @@ impl Bench {
             first_frame_ms,
             weight_bytes: engine.weight_bytes(),
             cache_bytes: talks.cache_bytes(),
+            state_bytes_a_session: talks.cache_bytes() / sessions,
             resident_bytes,
             peak_resident_bytes,
         })

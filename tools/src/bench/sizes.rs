@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use visavis::internals::bundle::Tensors;
 use visavis::internals::config::{
-    AudioConfig, Config, ConvConfig, FORMAT, FlowConfig, PoseConfig, SessionConfig, StudentConfig, VaeConfig,
+    AudioConfig, Config, ConvConfig, FORMAT, FlowConfig, Kind, PoseConfig, SessionConfig, StudentConfig, VaeConfig,
 };
 use visavis::internals::kernels::{Kernels, Scheme};
 use visavis::{Engine, Error, ErrorKind, Joint, Networks, Result, Rig};
@@ -80,6 +80,7 @@ impl Size {
         };
         Config {
             format: FORMAT,
+            kind: Kind::Sarah,
             name: name.into(),
             description: "Seeded weights for measuring speed; not a model".into(),
             licence: "none: the weights are random numbers".into(),
@@ -90,6 +91,7 @@ impl Size {
             audio,
             vae,
             flow,
+            dram: None,
             student: Some(StudentConfig { tau_history: 0.9, guidance: 2.0, gaze_guidance: 1.5 }),
             session: SessionConfig {
                 guidance: 1.3,

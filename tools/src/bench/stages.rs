@@ -13,9 +13,9 @@ pub const STAGES: [&str; 4] = ["audio", "flow", "decoder", "pose"];
 pub struct StageTimes {
     /// Both voices and the user's place.
     pub audio: f64,
-    /// All evaluations of the flow network.
+    /// All evaluations of the flow network; of the kind `dram`, the steps.
     pub flow: f64,
-    /// The decoder, and a share of re-anchoring where one is under way.
+    /// The decoder, and a share of re-anchoring where one is under way; 0 for the kind `dram`.
     pub decoder: f64,
     /// Features to frames.
     pub pose: f64,
@@ -49,9 +49,9 @@ impl Probe for StageTimes {
         let Some(last) = self.last.replace(Instant::now()) else { return };
         let spent = 1000.0 * last.elapsed().as_secs_f64();
         match name {
-            "x1" | "latents" => self.flow += spent,
+            "x1" | "latents" | "user_rows" | "m" | "d" | "delta" | "poses" => self.flow += spent,
             "decoded" => self.decoder += spent,
-            "roots" | "positions" | "rotations" => self.pose += spent,
+            "roots" | "positions" | "rotations" | "dyadic" => self.pose += spent,
             _ => self.audio += spent,
         }
     }

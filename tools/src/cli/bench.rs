@@ -33,7 +33,7 @@ pub struct BenchArgs {
     #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1,2", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=2))]
     pub threads: Vec<usize>,
     /// Sessions that are stepped together, or several numbers one after the other: 1,4
-    #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=64))]
+    #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=1024))]
     pub sessions: Vec<usize>,
     /// Blocks that are timed
     #[arg(long, value_name = "N", default_value = "200", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=1_000_000))]
@@ -109,7 +109,9 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     if !args.load.is_empty() {
         return under_load(args, &engine, &machine);
     }
-    for &sampler in &args.sampler {
+    // Where there are no samplers, they are all the same.
+    let samplers = if engine.needs_sarah().is_ok() { &args.sampler[..] } else { &args.sampler[..1] };
+    for &sampler in samplers {
         for &threads in &args.threads {
             for &sessions in &args.sessions {
                 let options = BenchOptions { sampler, threads, sessions, blocks: args.blocks, allocations };
@@ -117,7 +119,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
             }
         }
     }
-    let cold = if args.no_cold_start { Ok(Vec::new()) } else { cold_starts(args)? };
+    let cold = if args.no_cold_start { Ok(Vec::new()) } else { cold_starts(args, samplers)? };
     if args.json {
         let variants: serde_json::Map<_, _> =
             kernels.variants().iter().map(|(name, v)| ((*name).to_owned(), (*v).into())).collect();
@@ -181,12 +183,12 @@ fn under_load(args: &BenchArgs, engine: &Arc<Engine>, machine: &Machine) -> Resu
 
 /// The cold start with each sampler and number of threads; the inner error where no process could
 /// be started.
-fn cold_starts(args: &BenchArgs) -> Result<std::io::Result<Vec<ColdStart>>> {
+fn cold_starts(args: &BenchArgs, samplers: &[Sampler]) -> Result<std::io::Result<Vec<ColdStart>>> {
     let file = match args.size {
         Some(size) => cold_start::File::drawn(size, args.scheme)?,
         None => cold_start::File::of(files::model(args.model.as_deref())?),
     };
-    let each = args.sampler.iter().flat_map(|sampler| args.threads.iter().map(move |threads| (*sampler, *threads)));
+    let each = samplers.iter().flat_map(|sampler| args.threads.iter().map(move |threads| (*sampler, *threads)));
     Ok(each.map(|(sampler, threads)| cold_start::measure(&file, sampler, threads, args.networks)).collect())
 }
 
@@ -220,12 +222,15 @@ fn lines(b: &Bench) -> String {
             100.0 * b.share_of_read_limit,
         ),
     );
+    if b.state_bytes_a_session < 1_000_000 {
+        line("state", format!("{:.1} KB a session, beside its voices", b.state_bytes_a_session as f64 / 1024.0));
+    }
     line(
         "memory",
         format!(
-            "weights {} MB, caches {} MB, resident {}, at most {}",
-            b.weight_bytes / 1_000_000,
-            b.cache_bytes / 1_000_000,
+            "weights {:.1} MB, caches {:.1} MB, resident {}, at most {}",
+            b.weight_bytes as f64 / 1e6,
+            b.cache_bytes as f64 / 1e6,
             megabytes(b.resident_bytes),
             megabytes(b.peak_resident_bytes),
         ),

@@ -90,7 +90,8 @@ impl Drop for File {
 pub fn measure(file: &File, sampler: Sampler, threads: usize, networks: NetworkSet) -> Result<ColdStart> {
     let program = std::env::current_exe()?;
     let blocks =
-        BundleFile::open(&file.path).and_then(|f| Ok(f.parse()?.0.flow.window_blocks)).map_err(Error::other)?;
+        // Predictors without caches go on for two seconds.
+        BundleFile::open(&file.path).and_then(|f| Ok(f.parse()?.0.flow.window_blocks.max(15))).map_err(Error::other)?;
     let mut times = Vec::new();
     let mut bytes = String::new();
     for run in 0..=RUNS {

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
+use visavis::internals::config::Kind;
 use visavis::internals::kernels::Scheme;
 use visavis::internals::quant::{Budget, Keep, Options, Quantised, SMALL, quantise};
 use visavis::{BundleFile, Result};
@@ -27,7 +28,7 @@ pub struct QuantizeArgs {
     #[arg(long, value_name = "PATTERN[=f16|f32]")]
     pub keep: Vec<Keep>,
     /// Rounds each weight to the nearest value, instead of so that outputs on the sample
-    /// conversation lose least
+    /// conversation lose least; bundles of the kind dram always are
     #[arg(long)]
     pub plain: bool,
     /// Raises the layers that hurt most until blocks of the sample conversation are within this
@@ -58,7 +59,9 @@ pub fn run(args: &QuantizeArgs) -> Result<()> {
         Some(mm) => Some(Budget { mm, scene: files::conversation()?.scene(BLOCKS, None)?, progress: &progress }),
     };
     // Rounding to f16 has nothing to choose.
-    let calibrated = args.scheme != Scheme::F16 && !args.plain;
+    // Statistics are taken of the flow model alone.
+    let flow = file.parse()?.0.kind == Kind::Sarah;
+    let calibrated = args.scheme != Scheme::F16 && !args.plain && flow;
     let calibration = match calibrated {
         true => Some(files::conversation()?.scene(usize::MAX, None)?),
         false => None,

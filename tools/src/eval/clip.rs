@@ -7,6 +7,7 @@
 //! | `positions` | f32 `[T, J, 3]` | joint positions, metres, Y up, joints in the rig's order |
 //! | `rotations` | f32 `[T, J, 4]` | joint rotations in the world, `(x, y, z, w)` |
 //! | `user_head` | f32 `[T, 3]` | the user's head, metres |
+//! | `user_head_rotation` | f32 `[T, 4]` | its rotation in the world, `(x, y, z, w)`; left out where not recorded |
 //! | `agent_voice`, `user_voice` | i16 `[800 T]` | 24 kHz mono; left out where absent |
 
 use crate::recording::Recording;
@@ -36,13 +37,13 @@ pub struct Clip {
 enum Data {
     File {
         joints: usize,
-        /// Offsets in the file of positions, rotations, user's head, agent's voice, user's voice.
-        at: [Option<u64>; 5],
+        /// Offsets in the file of [`TENSORS`].
+        at: [Option<u64>; 6],
     },
     Memory(Arc<Segment>),
 }
 
-const TENSORS: [&str; 5] = ["positions", "rotations", "user_head", "agent_voice", "user_voice"];
+const TENSORS: [&str; 6] = ["positions", "rotations", "user_head", "agent_voice", "user_voice", "user_head_rotation"];
 
 /// Some seconds of a clip.
 #[derive(Debug, Clone)]
@@ -51,6 +52,8 @@ pub struct Segment {
     pub frames: Vec<Frame>,
     /// The user's head at each frame, metres.
     pub user: Vec<Vec3>,
+    /// Its rotation; `None` where that was not recorded.
+    pub user_rotation: Option<Vec<Quat>>,
     /// The agent's voice, 24 kHz mono, 800 samples per frame; `None` where absent.
     pub agent_voice: Option<Vec<i16>>,
     /// The user's voice, likewise.
@@ -87,11 +90,17 @@ impl Clip {
         let Some(&[frames, _, _]) = metadata.info("positions").map(|info| info.shape.as_slice()) else {
             return Err(bad("it has no tensor positions [T, J, 3]; see visavis::eval::Clip for the format"));
         };
-        let shapes =
-            [vec![frames, joints, 3], vec![frames, joints, 4], vec![frames, 3], vec![800 * frames], vec![800 * frames]];
-        let mut at = [None; 5];
+        let shapes = [
+            vec![frames, joints, 3],
+            vec![frames, joints, 4],
+            vec![frames, 3],
+            vec![800 * frames],
+            vec![800 * frames],
+            vec![frames, 4],
+        ];
+        let mut at = [None; 6];
         for (i, (name, shape)) in TENSORS.iter().zip(shapes).enumerate() {
-            let (dtype, width) = if i < 3 { (Dtype::F32, 4) } else { (Dtype::I16, 2) };
+            let (dtype, width) = if i < 3 || i == 5 { (Dtype::F32, 4) } else { (Dtype::I16, 2) };
             match metadata.info(name) {
                 Some(info) if info.dtype == dtype && info.shape == shape => {
                     let offset = start + info.data_offsets.0 as u64;
@@ -166,7 +175,7 @@ impl Clip {
         }
     }
 
-    fn segment(&self, joints: usize, at: &[Option<u64>; 5], from: usize, count: usize) -> Result<Segment> {
+    fn segment(&self, joints: usize, at: &[Option<u64>; 6], from: usize, count: usize) -> Result<Segment> {
         let io = |e| Error::io("read the clip", &self.path, e);
         let mut file = File::open(&self.path).map_err(io)?;
         let mut bytes = |tensor: usize, a_frame: usize| -> Result<Option<Vec<u8>>> {
@@ -191,6 +200,8 @@ impl Clip {
         let rotations = floats(bytes(1, 16 * joints)?)?;
         let user = floats(bytes(2, 12)?)?;
         let (agent_voice, user_voice) = (samples(bytes(3, 1600)?), samples(bytes(4, 1600)?));
+        let turned = bytes(5, 16)?.map(|bytes| floats(Some(bytes))).transpose()?;
+        let user_rotation = turned.map(|numbers| numbers.chunks_exact(4).map(rotation).collect());
 
         let mut frames = Vec::with_capacity(count);
         let mut yaw = 0.0;
@@ -203,7 +214,8 @@ impl Clip {
             let (index, time, hips) = (i as u64, i as f64 / f64::from(FPS), global[0].position);
             frames.push(Frame { index, time, root, hips, global, ..Frame::empty(joints) });
         }
-        Ok(Segment { frames, user: user.chunks_exact(3).map(Vec3::from_slice).collect(), agent_voice, user_voice })
+        let user = user.chunks_exact(3).map(Vec3::from_slice).collect();
+        Ok(Segment { frames, user, user_rotation, agent_voice, user_voice })
     }
 }
 
@@ -217,7 +229,8 @@ impl Segment {
             (f.index, f.time) = (i as u64, i as f64 / f64::from(FPS));
         });
         let (agent_voice, user_voice) = (voice(&self.agent_voice), voice(&self.user_voice));
-        Self { frames, user: self.user[from..to].to_vec(), agent_voice, user_voice }
+        let user_rotation = self.user_rotation.as_ref().map(|all| all[from..to].to_vec());
+        Self { frames, user: self.user[from..to].to_vec(), user_rotation, agent_voice, user_voice }
     }
 
     /// The motion `frames`, which may be another than its own, with what was heard and seen here.

@@ -104,7 +104,7 @@ impl Endurance {
             let user: Vec<Vec3> = (0..length * periods).map(|i| circling(i % length, length)).collect();
             let options =
                 SessionOptions { start: Root::default(), seed: run as u64, gaze: Some(GAZE), ..options.clone() };
-            let outcome = generate(engine, options, voices, user)?;
+            let outcome = generate(engine, options, voices, user, None)?;
             Ok(Run { guard: outcome.stats.guard, ..Run::of(&outcome.recording, length) })
         })?;
         let (trips, held) =
@@ -225,7 +225,7 @@ impl Follow {
             let voices = voices(windows, [run, runs], end).map(Some);
             let user: Vec<Vec3> = (0..end).map(|i| walking(i as f32 / FPS as f32)).collect();
             let options = SessionOptions { start: Root::default(), seed: run as u64, ..options.clone() };
-            let recording = generate(engine, options, voices, user.iter().copied())?.recording;
+            let recording = generate(engine, options, voices, user.iter().copied(), None)?.recording;
             let distance = |i: usize| {
                 let (root, user) = (recording.frames[i].root, user[i]);
                 (root.x - f64::from(user.x)).hypot(root.z - f64::from(user.z))

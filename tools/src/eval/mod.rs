@@ -133,8 +133,8 @@ pub struct Report {
     pub real_talk: crate::metrics::Liveliness,
     /// The gaze dial of the first sampler and of the single step.
     pub dials: Vec<Dial>,
-    /// What the autoencoder loses.
-    pub reconstruction: Reconstruction,
+    /// What the autoencoder loses; of bundles that have one.
+    pub reconstruction: Option<Reconstruction>,
     /// Reaction times of the first sampler.
     pub reaction: Option<Reaction>,
     /// A long run of the first sampler.
@@ -217,7 +217,8 @@ pub fn evaluate(
     let session = SessionOptions { sampler: samplers[0], gaze: None, ..options.session.clone() };
     let (threads, quick) = (options.threads, options.quick);
     tell("reconstruction");
-    let reconstruction = Reconstruction::measure(engine, &windows, threads)?;
+    let encodes = engine.needs_sarah().is_ok();
+    let reconstruction = encodes.then(|| Reconstruction::measure(engine, &windows, threads)).transpose()?;
     let (mut reaction, mut follow, mut endurance) = (None, None, None);
     if !options.motion_only {
         tell("reaction time");
@@ -285,7 +286,11 @@ impl Judge<'_> {
     /// The samplers that the bundle has.
     fn samplers(&self) -> Result<Vec<Sampler>> {
         let has = |s: &Sampler| *s != Sampler::Single || self.engine.config().student.is_some();
-        let samplers: Vec<_> = self.options.samplers.iter().copied().filter(has).collect();
+        let mut samplers: Vec<_> = self.options.samplers.iter().copied().filter(has).collect();
+        if self.engine.needs_sarah().is_err() {
+            // Without samplers all rows would be the same.
+            samplers.truncate(1);
+        }
         if samplers.is_empty() {
             return Err(Error::new(ErrorKind::Argument, "no sampler to evaluate that this bundle has"));
         }

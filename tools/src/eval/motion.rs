@@ -4,32 +4,41 @@ use super::clip::Segment;
 use super::window::{LEAD, Window};
 use crate::offline::UserPath;
 use crate::offline::{Conversation, Outcome, run};
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use std::sync::Arc;
 use visavis::{Engine, FPS, Frame, Result, SessionOptions};
 
-/// Runs a session over voices (full scale 1) and a user's head (one position per frame).
+/// Runs a session over voices (full scale 1) and a user's head (one position per frame, and where
+/// it was recorded one rotation).
 pub(super) fn generate(
     engine: &Arc<Engine>,
     options: SessionOptions,
     [agent, user]: [Option<Vec<f32>>; 2],
     head: impl IntoIterator<Item = Vec3>,
+    rotations: Option<&[Quat]>,
 ) -> Result<Outcome> {
     let at = |i: usize| i as f64 / f64::from(FPS);
     let mut points: Vec<_> = head.into_iter().enumerate().map(|(i, p)| (at(i), p)).collect();
     // A path ends with its last point; the last frame has a length too.
     points.extend(points.last().map(|(_, p)| (at(points.len()), *p)));
-    let talk = Conversation::new(agent, user, Some(UserPath::from_points(points)?))?;
+    let count = points.len();
+    let mut path = UserPath::from_points(points)?;
+    if let Some(rotations) = rotations {
+        let last = rotations.last().into_iter();
+        path = path.with_rotations(rotations.iter().chain(last).copied().take(count).collect())?;
+    }
+    let talk = Conversation::new(agent, user, Some(path))?;
     run(&mut engine.session(options)?, &talk, &mut |_| {})
 }
 
 /// The model's motion in a window: a session that starts where the clip's agent stands, without
 /// what leads in.
 pub(super) fn in_window(engine: &Arc<Engine>, options: &SessionOptions, window: &Window) -> Result<Vec<Frame>> {
-    let Segment { frames, user, .. } = &window.segment;
+    let Segment { frames, user, user_rotation, .. } = &window.segment;
     let options = SessionOptions { start: frames[0].root, ..options.clone() };
     let voices = [window.segment.agent(), window.segment.user()];
-    let mut motion = generate(engine, options, voices, user.iter().copied())?.recording.frames;
+    let mut motion =
+        generate(engine, options, voices, user.iter().copied(), user_rotation.as_deref())?.recording.frames;
     motion.truncate(frames.len());
     Ok(motion.split_off(LEAD))
 }

@@ -98,7 +98,7 @@ impl Idle {
             let voice = || Some(vec![0.0; frames * FRAME_SAMPLES]);
             let user = std::iter::repeat_n(Vec3::new(0.0, 1.65, 1.6), frames);
             let options = SessionOptions { seed: options.seed + run as u64, ..options.clone() };
-            let motion = generate(engine, options, [voice(), voice()], user)?.recording;
+            let motion = generate(engine, options, [voice(), voice()], user, None)?.recording;
             let mut tally = Tally::default();
             let frames: &[Frame] = &motion.frames[LEAD.min(motion.frames.len())..];
             tally.add(&motion.rig, frames, &vec![true; frames.len()]);
@@ -158,6 +158,7 @@ mod tests {
         let segment = Segment {
             frames,
             user: user.collect(),
+            user_rotation: None,
             agent_voice: Some(voice.iter().map(sample).collect()),
             user_voice: None,
         };

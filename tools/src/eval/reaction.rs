@@ -61,10 +61,10 @@ impl Reaction {
         let time = |frames: &[Frame], user: &[Vec3]| time(rig, &frames[BEFORE..], &user[BEFORE..]);
         let truth: Vec<f64> = events.iter().map(|e| time(&e.segment.frames, &e.segment.user)).collect();
         let model = each(threads, events.len(), &|_| {}, &|i| {
-            let Segment { frames, user, .. } = &events[i].segment;
+            let Segment { frames, user, user_rotation, .. } = &events[i].segment;
             let options = SessionOptions { start: frames[0].root, seed: i as u64, ..options.clone() };
             let voices = [events[i].segment.agent(), events[i].segment.user()];
-            let motion = generate(engine, options, voices, user.iter().copied())?;
+            let motion = generate(engine, options, voices, user.iter().copied(), user_rotation.as_deref())?;
             Ok(time(&motion.recording.frames, user))
         })?;
         let staged_jumps = most.min(2 * windows.len());
@@ -74,7 +74,7 @@ impl Reaction {
             let user: Vec<Vec3> = (0..BEFORE + AFTER).map(place).collect();
             let part = windows[i / 2].segment.cut(0, BEFORE + AFTER);
             let options = SessionOptions { start: Root::default(), seed: 1000 + i as u64, ..options.clone() };
-            let motion = generate(engine, options, [part.agent(), part.user()], user.iter().copied())?;
+            let motion = generate(engine, options, [part.agent(), part.user()], user.iter().copied(), None)?;
             Ok(time(&motion.recording.frames, &user))
         })?;
         Ok(Self {

@@ -158,16 +158,17 @@ impl Report {
     fn behaviour(&self) -> Table {
         let mut rows = Vec::new();
         let mut row = |what: &str, value: String| rows.push(vec![what.to_owned(), value]);
-        let r = &self.reconstruction;
-        let text = format!(
-            "joints {:.1}, hands {:.1}, feet {:.1}, root after a second {:.1} mm; rotation {:.1} degrees",
-            1000.0 * r.joints,
-            1000.0 * r.hands,
-            1000.0 * r.feet,
-            1000.0 * r.root,
-            r.rotation
-        );
-        row("reconstruction", text);
+        if let Some(r) = &self.reconstruction {
+            let text = format!(
+                "joints {:.1}, hands {:.1}, feet {:.1}, root after a second {:.1} mm; rotation {:.1} degrees",
+                1000.0 * r.joints,
+                1000.0 * r.hands,
+                1000.0 * r.feet,
+                1000.0 * r.root,
+                r.rotation
+            );
+            row("reconstruction", text);
+        }
         if let Some(r) = &self.reaction {
             let (staged, truth, model) = (number(r.staged, 2), number(r.truth, 2), number(r.model, 2));
             row("reaction, user jumps 90 degrees", format!("{staged} s, median of {}", r.staged_jumps));

@@ -53,7 +53,7 @@ fn segment(rig: &Rig, talk: &Conversation, agent: &[f32], user: &[f32]) -> Segme
         samples.resize(count * visavis::internals::frame::FRAME_SAMPLES, 0);
         Some(samples)
     };
-    Segment { frames, user: users, agent_voice: pcm(agent), user_voice: pcm(user) }
+    Segment { frames, user: users, user_rotation: None, agent_voice: pcm(agent), user_voice: pcm(user) }
 }
 
 #[derive(Debug, Default)]

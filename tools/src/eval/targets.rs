@@ -32,7 +32,7 @@ const FOLLOWED: f64 = 2.5;
 /// Every target against the report.
 pub(super) fn verdicts(report: &Report) -> Vec<Verdict> {
     let mut all = Vec::new();
-    all.extend(reconstruction(&report.reconstruction));
+    all.extend(report.reconstruction.iter().flat_map(reconstruction));
     if let (Some(truth), Some(first)) = (report.row("corpus"), report.models().next()) {
         all.extend(motion(report, truth, first));
     }

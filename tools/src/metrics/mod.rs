@@ -25,6 +25,7 @@
 
 mod beat;
 mod bones;
+mod dyadic;
 mod feet;
 mod frechet;
 mod gaze;
@@ -42,6 +43,7 @@ mod testing;
 
 pub use beat::{Beat, beat};
 pub use bones::{BoneDeviation, bone_deviation};
+pub use dyadic::Dyadic;
 pub use feet::{CONTACT_HEIGHT, SLIDE_SPEED, foot_clearances, foot_slide, support_foot_speed};
 pub use frechet::frechet;
 pub use gaze::{gaze_score, gaze_scores, head_angle};

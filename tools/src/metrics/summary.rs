@@ -1,5 +1,6 @@
 //! All metrics that need no ground truth, for `metrics.json`.
 
+use super::dyadic::Dyadic;
 use super::*;
 use crate::recording::Recording;
 use serde::Serialize;
@@ -34,6 +35,8 @@ pub struct Summary {
     /// Largest distance between a decoded joint and the fixed-bone-length rig's, over all frames,
     /// metres.
     pub max_fit_error: Option<f64>,
+    /// Whom the body follows; of bundles that tell ([`visavis::Frame::dyadic`]).
+    pub dyadic: Option<Dyadic>,
     /// Frames in which the agent speaks; `None` without an agent voice.
     pub speaking: Option<Split>,
     /// Frames in which it does not.
@@ -72,6 +75,7 @@ impl Summary {
             bone_deviation: bone_deviation(rig, frames),
             joint_speed: joint_speed(frames),
             max_fit_error: frames.iter().map(|f| f64::from(f.fit_error)).reduce(f64::max),
+            dyadic: Dyadic::of(recording),
             speaking: split(true),
             non_speaking: split(false),
         }
@@ -138,7 +142,7 @@ mod tests {
         let json: serde_json::Value = serde_json::from_str(&Summary::of(&r).to_json()).unwrap();
         assert_eq!(json["frames"], 120);
         assert_eq!(json["foot_slide"], 0.0);
-        for field in ["head_angle", "gaze_target", "beat", "speaking", "non_speaking"] {
+        for field in ["head_angle", "gaze_target", "beat", "dyadic", "speaking", "non_speaking"] {
             assert!(json.as_object().unwrap().contains_key(field) && json[field].is_null(), "{field}");
         }
     }

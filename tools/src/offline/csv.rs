@@ -1,6 +1,6 @@
 //! User paths from CSV files: `t,x,y,z`.
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use std::path::Path;
 use visavis::internals::user::{HOLD_SECONDS, MAX_DISTANCE};
 use visavis::{Error, ErrorKind, Result};
@@ -10,10 +10,13 @@ const MAX_BYTES: u64 = 1 << 30;
 
 const COLUMNS: [&str; 4] = ["t", "x", "y", "z"];
 
-/// A recorded path of the user's head: positions at ascending times, at least one.
+/// A recorded path of the user's head: positions at ascending times, at least one, and rotations
+/// where they were recorded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UserPath {
     points: Vec<(f64, Vec3)>,
+    /// As many as points, or none.
+    rotations: Vec<Quat>,
 }
 
 impl UserPath {
@@ -59,7 +62,7 @@ impl UserPath {
         if points.is_empty() {
             return Err(bad("there are no positions below the header; add lines like `0.0,0.1,1.65,2.0`".into()));
         }
-        Ok(Self { points })
+        Ok(Self { points, rotations: Vec::new() })
     }
 
     /// A path of positions (m) at times (s).
@@ -72,7 +75,23 @@ impl UserPath {
         if points.is_empty() || !finite || points.windows(2).any(|w| w[1].0 <= w[0].0) {
             return Err(bad("points of a path are finite, at ascending times, and at least one".into()));
         }
-        Ok(Self { points })
+        Ok(Self { points, rotations: Vec::new() })
+    }
+
+    /// The same with the head's rotation at each point.
+    ///
+    /// # Errors
+    /// [`ErrorKind::UserPath`] when there are not as many, or one is not of unit length.
+    pub fn with_rotations(self, rotations: Vec<Quat>) -> Result<Self> {
+        if rotations.len() != self.points.len() || !rotations.iter().all(|r| r.is_normalized()) {
+            return Err(bad("rotations of a path are of unit length, one a point".into()));
+        }
+        Ok(Self { rotations, ..self })
+    }
+
+    /// The head's rotations, one a point, or none at all.
+    pub fn rotations(&self) -> &[Quat] {
+        &self.rotations
     }
 
     /// Times (s) and head positions (m), ascending in time; never empty.
@@ -146,7 +165,8 @@ mod tests {
 
     #[test]
     fn reads_what_spreadsheets_write() {
-        let want = UserPath { points: vec![(0.0, Vec3::new(1.0, 1.6, -2.0)), (0.5, Vec3::new(2.0, 1.5, 0.0))] };
+        let points = vec![(0.0, Vec3::new(1.0, 1.6, -2.0)), (0.5, Vec3::new(2.0, 1.5, 0.0))];
+        let want = UserPath { points, rotations: Vec::new() };
         for text in [
             "t,x,y,z\n0,1,1.6,-2\n0.5,2,1.5,0\n",
             "t,x,y,z\n0,1,1.6,-2\n0.5,2,1.5,0",

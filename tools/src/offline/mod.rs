@@ -209,7 +209,7 @@ impl Outcome {
 pub fn run(session: &mut Session, talk: &Conversation, progress: &mut dyn FnMut(Progress)) -> Result<Outcome> {
     session.reset()?;
     let total = talk.frames();
-    let points = talk.path.as_ref().map(for_session).unwrap_or_default();
+    let points = talk.path.as_ref().map(path::poses_for_session).unwrap_or_default();
     let mut points = points.into_iter().peekable();
     let mut voices = [talk.agent.as_deref(), talk.user.as_deref()].map(|v| v.unwrap_or_default().chunks(BLOCK_SAMPLES));
     let mut frames = Vec::with_capacity(total);
@@ -222,8 +222,8 @@ pub fn run(session: &mut Session, talk: &Conversation, progress: &mut dyn FnMut(
         if let Some(samples) = voices[1].next() {
             session.push_user_audio(samples, SAMPLE_RATE)?;
         }
-        while let Some((time, position)) = points.next_if(|(time, _)| *time <= now) {
-            session.push_user_head(position, time)?;
+        while let Some((time, position, rotation)) = points.next_if(|(time, ..)| *time <= now) {
+            session.push_user_pose(position, rotation, time)?;
         }
         if let Some(block) = session.poll(now)? {
             let wanted = block.len().min(total - frames.len());

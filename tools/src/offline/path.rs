@@ -1,7 +1,7 @@
 //! A recorded path as a tracker would have sent it.
 
 use crate::offline::UserPath;
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use visavis::internals::user::{HOLD_SECONDS, TELEPORT_SPEED};
 
 /// Positions further apart in time than this are filled in, seconds; head trackers send 72 to 120
@@ -16,11 +16,18 @@ const RATE: f64 = 90.0;
 /// straight line. Gaps of more than half a second and jumps faster than 12 m/s stay as they are,
 /// for the session to judge.
 pub fn for_session(path: &UserPath) -> Vec<(f64, Vec3)> {
+    poses_for_session(path).into_iter().map(|(time, position, _)| (time, position)).collect()
+}
+
+/// As [`for_session`], with rotations where the path has them, in between the shorter way.
+pub(super) fn poses_for_session(path: &UserPath) -> Vec<(f64, Vec3, Option<Quat>)> {
     let points = path.points();
+    let rotation = |i: usize| path.rotations().get(i).copied();
     let mut out = Vec::with_capacity(points.len());
-    for pair in points.windows(2) {
+    for (i, pair) in points.windows(2).enumerate() {
         let ((t0, p0), (t1, p1)) = (pair[0], pair[1]);
-        out.push(pair[0]);
+        let (r0, r1) = (rotation(i), rotation(i + 1));
+        out.push((t0, p0, r0));
         let gap = t1 - t0;
         // A ten-thousandth of tolerance: 60 Hz written with six decimals is not sparse.
         if gap <= SPARSE * 1.0001 || gap > HOLD_SECONDS || f64::from(p0.distance(p1)) > f64::from(TELEPORT_SPEED) * gap
@@ -30,10 +37,11 @@ pub fn for_session(path: &UserPath) -> Vec<(f64, Vec3)> {
         let steps = (gap * RATE).ceil() as u32;
         out.extend((1..steps).map(|i| {
             let part = f64::from(i) / f64::from(steps);
-            (t0 + part * gap, p0.lerp(p1, part as f32))
+            let rotation = r0.zip(r1).map(|(a, b)| a.lerp(b, part as f32));
+            (t0 + part * gap, p0.lerp(p1, part as f32), rotation)
         }));
     }
-    out.extend(points.last());
+    out.extend(points.last().map(|&(time, position)| (time, position, rotation(points.len() - 1))));
     out
 }
 
@@ -55,6 +63,19 @@ mod tests {
         }
         assert_eq!(points[9], (0.1, Vec3::new(0.5, 1.0, 0.0)));
         assert_eq!(points[18], (0.2, Vec3::new(0.5, 1.0, 1.0)));
+    }
+
+    #[test]
+    fn rotations_are_filled_in_too() {
+        let path = UserPath::parse("t,x,y,z\n0,0,1,0\n0.1,0,1,0\n").unwrap();
+        assert!(path.clone().with_rotations(vec![Quat::IDENTITY]).is_err());
+        assert!(path.clone().with_rotations(vec![Quat::from_xyzw(0.0, 0.0, 0.0, 2.0); 2]).is_err());
+        assert!(poses_for_session(&path).iter().all(|(.., rotation)| rotation.is_none()));
+        let path = path.with_rotations(vec![Quat::IDENTITY, -Quat::from_rotation_x(0.2)]).unwrap();
+        let poses = poses_for_session(&path);
+        let pitch = |i: usize| poses[i].2.map(|r: Quat| 2.0 * (r.x / r.w).atan()).unwrap();
+        assert_eq!(poses.len(), 10);
+        assert!(pitch(0).abs() < 1e-6 && (pitch(9) - 0.2).abs() < 1e-5 && (pitch(5) - 0.2 * 5.0 / 9.0).abs() < 1e-3);
     }
 
     #[test]

@@ -12,12 +12,16 @@ const STAY: u64 = 6;
 pub(super) const SWITCHES: u64 = 120;
 
 /// Seam metric at `switches` switches of a session that goes up and down a governor's ladder, a
-/// step every 0.8 s, in a conversation; `None` where nothing moves. Slots are up to date when they
+/// step every 0.8 s, in a conversation; `None` where nothing moves, or there is no ladder. Slots are up to date when they
 /// are climbed to, as the governor sees to it: it changes time, not motion.
 ///
 /// # Errors
 /// Those of a session.
 pub(super) fn measure(engine: &Arc<Engine>, voices: &Voices, switches: u64) -> Result<Option<f64>> {
+    if engine.needs_sarah().is_err() {
+        // There are no samplers.
+        return Ok(None);
+    }
     let last = if engine.config().student.is_some() { Sampler::Single } else { Sampler::Midpoint1 };
     let ladder = [Sampler::Midpoint4, Sampler::Midpoint2, last, Sampler::Midpoint2];
     let plan = |i: u64| Decision {

@@ -72,8 +72,9 @@ impl Window {
             let mut own = self.spare.pop().unwrap_or_else(|| frame.clone());
             own.global.clone_from(&frame.global);
             own.local.clone_from(&frame.local);
-            let (global, local) = (std::mem::take(&mut own.global), std::mem::take(&mut own.local));
-            self.recording.frames.push(Frame { global, local, ..*frame });
+            own.dyadic.clone_from(&frame.dyadic);
+            let Frame { global, local, dyadic, .. } = own;
+            self.recording.frames.push(Frame { global, local, dyadic, ..*frame });
         }
         self.recording.user.resize(self.recording.frames.len(), user);
         if self.recording.frames.len() >= PIECE {

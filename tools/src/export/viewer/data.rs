@@ -51,6 +51,7 @@ pub fn json(recording: &Recording, meta: &Meta) -> String {
         "local": shorts(frames.iter().flat_map(|f| rotations(f, rig.joints.len()))),
         "decoded": shorts(frames.iter().flat_map(|f| positions(f, rig.joints.len()))),
         "fit": floats(frames.iter().map(|f| f.fit_error)),
+        "dyadic": dyadic(frames, rig.joints.len()),
         "gaze": floats(frames.iter().map(|f| f.gaze.unwrap_or(f32::NAN))),
         "sampler": base64(&used),
         "touch": base64(&touch),
@@ -69,6 +70,15 @@ fn sampler_name(sampler: Sampler) -> String {
         Sampler::Euler(steps) => format!("Euler {}", steps.get()),
         midpoint => format!("midpoint {}", midpoint.steps()),
     }
+}
+
+/// How much each joint follows the user, in 255ths, or null where that is not told.
+fn dyadic(frames: &[Frame], joints: usize) -> Value {
+    if frames.is_empty() || frames.iter().any(|frame| frame.dyadic.len() != joints) {
+        return Value::Null;
+    }
+    let shares = frames.iter().flat_map(|frame| frame.dyadic.iter().map(|share| (share * 255.0).round() as u8));
+    base64(&shares.collect::<Vec<_>>()).into()
 }
 
 /// Local rotations as 16-bit fractions; a joint the frame lacks is unrotated.
@@ -210,6 +220,10 @@ mod tests {
         assert!((f32::from(local[4]) / 32767.0 - 0.25_f32.sin()).abs() < 2e-5);
         let decoded = i16s(&v["decoded"]);
         assert!((f32::from(decoded[6 + 4]) * STEP - 0.2).abs() < STEP);
+        assert!(v["dyadic"].is_null());
+        let mut told = r.clone();
+        told.frames.iter_mut().for_each(|frame| frame.dyadic = vec![0.0, 1.0]);
+        assert_eq!(unbase64(parsed(&told, &Meta::default())["dyadic"].as_str().unwrap()), [0, 255, 0, 255, 0, 255]);
         let user = f32s(&v["user"]);
         assert!(user[0].is_nan());
         assert_eq!(user[3..6], [0.1, 1.6, 2.0]);

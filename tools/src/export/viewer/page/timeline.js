@@ -1,4 +1,4 @@
-// The lanes at the foot of the page: both voices, gaze, and the play head. Click or drag to seek.
+// The lanes at the foot of the page: both voices, gaze, whom the body follows where that is told, and the play head. Click or drag to seek.
 
 function createTimeline(canvas, d, onSeek) {
   const g = canvas.getContext("2d");
@@ -7,6 +7,7 @@ function createTimeline(canvas, d, onSeek) {
     { name: "User", kind: "voice", samples: d.userVoice, colour: "--user" },
     { name: "Gaze", kind: "gaze" },
   ];
+  if (d.dyadic) lanes.push({ name: "Dyadic", kind: "dyadic" });
   const still = document.createElement("canvas");
   let key = "";
   const margin = (ratio) => 46 * ratio;
@@ -27,7 +28,7 @@ function createTimeline(canvas, d, onSeek) {
   function paint(w, h, ratio, style) {
     still.width = w;
     still.height = h;
-    const s = still.getContext("2d"), left = margin(ratio), wide = w - left, high = h / 3;
+    const s = still.getContext("2d"), left = margin(ratio), wide = w - left, high = h / lanes.length;
     const variable = (name) => style.getPropertyValue(name).trim();
     s.font = `500 ${11 * ratio}px ${style.fontFamily}`;
     s.textBaseline = "middle";
@@ -38,6 +39,7 @@ function createTimeline(canvas, d, onSeek) {
       s.fillStyle = variable("--line");
       s.fillRect(left, Math.round(middle), wide, 1);
       if (lane.kind === "gaze") return gaze(s, left, wide, middle, half, ratio, variable);
+      if (lane.kind === "dyadic") return dyadic(s, left, wide, middle, half, ratio);
       if (!lane.samples) {
         s.fillStyle = variable("--dim");
         return s.fillText("no voice", left + 8 * ratio, middle - 7 * ratio);
@@ -72,6 +74,23 @@ function createTimeline(canvas, d, onSeek) {
       s.moveTo(left + (wide * i) / d.frames, y(a));
       s.lineTo(left + (wide * (i + every)) / d.frames, y(b));
       s.stroke();
+    }
+  }
+
+  // How much the body follows the user: mean and largest share of the joints.
+  function dyadic(s, left, wide, middle, half, ratio) {
+    const n = d.joints.length, every = Math.max(1, Math.floor(d.frames / wide));
+    s.lineWidth = 1.75 * ratio;
+    for (const [of, alpha] of [[(all) => Math.max(...all), 0.35], [(all) => all.reduce((a, b) => a + b, 0) / n, 1]]) {
+      const share = (i) => of(d.dyadic.subarray(i * n, (i + 1) * n)) / 255;
+      for (let i = 0; i + every < d.frames; i += every) {
+        const [a, b] = [share(i), share(i + every)];
+        s.strokeStyle = css(dyadicColour(0.5 * (a + b)), alpha);
+        s.beginPath();
+        s.moveTo(left + (wide * i) / d.frames, middle + half - 2 * half * a);
+        s.lineTo(left + (wide * (i + every)) / d.frames, middle + half - 2 * half * b);
+        s.stroke();
+      }
     }
   }
 

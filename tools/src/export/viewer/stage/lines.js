@@ -19,9 +19,10 @@ function sceneLines(d, pose, options) {
     if (pose.user && !options.fromUser) dashes(pose.eyes, add(pose.user, scale(unit(sub(pose.eyes, pose.user)), 0.13)), c);
   }
   if (options.joints) {
-    const decoded = options.joints, c = [1, 0.85, 0.3];
+    const decoded = options.joints;
     decoded.forEach((p, j) => {
       const parent = d.joints[j].parent;
+      const c = d.dyadic ? dyadicColour(d.dyadic[pose.frame * d.joints.length + j] / 255) : [1, 0.85, 0.3];
       line(add(p, [0, -0.009, 0]), add(p, [0, 0.009, 0]), 0.018, [...c, 0.95]);
       if (parent !== null) line(decoded[parent], p, 0.006, [...c, 0.8]);
     });

@@ -70,4 +70,9 @@ function timeColour(t) {
   return x < 1 ? lerp(stops[0], stops[1], x) : lerp(stops[1], stops[2], x - 1);
 }
 
+// Colour of how much a joint follows the user, 0 to 1: blue for the agent's own, rose for the user's.
+function dyadicColour(share) {
+  return lerp([0.29, 0.56, 0.98], [0.96, 0.36, 0.60], clamp(share, 0, 1));
+}
+
 const css = (c, alpha = 1) => `rgba(${c.map((x) => Math.round(255 * clamp(x, 0, 1))).join(",")},${alpha})`;

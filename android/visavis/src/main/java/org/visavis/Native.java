@@ -56,6 +56,10 @@ final class Native {
 
     static native void pushHead(long session, float x, float y, float z, double time);
 
+    static native void pushPose(long session, float x, float y, float z, float qx, float qy, float qz, float qw, double time);
+
+    static native int dyadic(long session, float[] out, int offset);
+
     static native void setGaze(long session, float target);
 
     static native void setNaturalGaze(long session);

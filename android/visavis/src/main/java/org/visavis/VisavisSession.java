@@ -99,6 +99,26 @@ public final class VisavisSession implements AutoCloseable {
     }
 
     /**
+     * As {@link #pushUserHead(float, float, float, long)}, with the head's rotation: a quaternion of about unit length in the world, identity where
+     * the user faces +Z. Bundles of the kind {@code dram} see where the face points and how the head nods; the others make the same motion with and
+     * without.
+     */
+    public void pushUserHead(float x, float y, float z, float qx, float qy, float qz, float qw, long timeNanos) {
+        Native.pushPose(handle, x, y, z, qx, qy, qz, qw, timeNanos * 1e-9);
+    }
+
+    /**
+     * Writes how much each joint follows the user rather than the agent's own voice and habit in the last block's frames, 0 to 1, frame by frame,
+     * joints as in the rig: the read-out of bundles of the kind {@code dram}.
+     *
+     * @return numbers written: 4 times the number of joints, or 0 before the first block and with other bundles
+     * @throws IllegalArgumentException when there is not that much room
+     */
+    public int dyadic(@NonNull float[] out, int offset) {
+        return Native.dyadic(handle, out, offset);
+    }
+
+    /**
      * Sets the gaze target from the next block on, -1 to 1: 0 is averted, 1 sustained eye contact.
      *
      * @throws IllegalArgumentException outside -1 to 1
