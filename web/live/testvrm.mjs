@@ -17,7 +17,8 @@ export function vrmOf({ joints, eyes, headBack }, size = 0.92) {
   for (const { parent, offset } of d.joints) d.rest.push(parent === null ? [...offset] : offset.map((x, k) => x + d.rest[parent][k]));
   const shapes = createShapes(d), { data, indices } = bodyMesh(d, shapes), vertices = new DataView(data), count = data.byteLength / STRIDE;
 
-  const bones = [...d.joints.map(({ name }, j) => ({ name, at: d.rest[j], parent: d.joints[j].parent })), ...FACE_BONES.map((name) => ({ name, at: shapes.pivots[name], parent: d.index.get("head") }))];
+  const bones = [...d.joints.map(({ name, parent }, j) => ({ name, at: d.rest[j], bound: shapes.bind.at[j], turn: shapes.bind.turn[j], parent })),
+    ...FACE_BONES.map((name) => ({ name, at: shapes.pivots[name], bound: shapes.pivots[name], turn: 0, parent: d.index.get("head") }))];
   const colours = new Uint8Array(4 * count), morphs = { blink: new Float32Array(3 * count), aa: new Float32Array(3 * count) };
   const lowest = [Infinity, Infinity, Infinity], highest = [-Infinity, -Infinity, -Infinity];
   for (let i = 0; i < count; i++) {
@@ -35,8 +36,8 @@ export function vrmOf({ joints, eyes, headBack }, size = 0.92) {
   function colourOf([x, y, z], tint, off) {
     if (tint === TINT.eye) return off < 0.2 ? [0, 0, 0] : off < 0.47 ? [0.06, 0.03, 0.015] : [0.8, 0.79, 0.78];
     if (tint !== TINT.body) return COLOURS[tint];
-    const [soles, waist, collar, cuffs] = shapes.cloth;
-    if (Math.abs(x) > cuffs || y > collar + 0.5 * Math.abs(x) - 0.3 * z) return COLOURS[TINT.skin];
+    const [soles, waist, collar] = shapes.cloth, [ax, ay, cuffs, least] = shapes.sleeve;
+    if ((Math.abs(x) > least && Math.abs(x) * ax + y * ay > cuffs) || y > collar + 0.5 * Math.abs(x) - 0.3 * z) return COLOURS[TINT.skin];
     return CLOTHES[y > waist ? 0 : y > soles ? 1 : 2];
   }
 
@@ -46,7 +47,11 @@ export function vrmOf({ joints, eyes, headBack }, size = 0.92) {
     parts.push(padded(Buffer.from(bytes.buffer ?? bytes, bytes.byteOffset ?? 0, bytes.byteLength), 0));
     return views.length - 1;
   };
-  const inverse = Float32Array.from(bones.flatMap(({ at }) => [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...at.map((x) => -x), 1]));
+  // Nodes rest in the T-pose that VRM asks for; the mesh is bound with its arms half lowered.
+  const inverse = Float32Array.from(bones.flatMap(({ bound: [x, y, z], turn }) => {
+    const [s, c] = [Math.sin(turn), Math.cos(turn)];
+    return [c, -s, 0, 0, s, c, 0, 0, 0, 0, 1, 0, -c * x - s * y, s * x - c * y, -z, 1];
+  }));
   const mesh = view(data, { byteStride: STRIDE, target: 34962 });
   const vec = (bufferView, byteOffset, componentType, type, extra = {}) => ({ bufferView, byteOffset, componentType, count, type, ...extra });
   const accessors = [

@@ -45,10 +45,10 @@ function createShapes(d) {
   if (has("hips", "leftUpperLeg", "rightUpperLeg")) {
     const [l, r, c] = [at("leftUpperLeg"), at("rightUpperLeg"), at("hips")];
     put("body", "hips", from(lerp(l, c, 0.35), 0, 0.035, -0.005), from(lerp(r, c, 0.35), 0, 0.035, -0.005), 0.106, 0.106, { ...flat(1.05), core: true });
-    put("body", "hips", from(l, 0, 0.01, -0.035), from(l, 0, 0, -0.035), 0.085, 0.085);
-    put("body", "hips", from(r, 0, 0.01, -0.035), from(r, 0, 0, -0.035), 0.085, 0.085);
+    put("body", "hips", from(l, 0, 0.03, -0.035), from(l, 0, 0.02, -0.035), 0.08, 0.08);
+    put("body", "hips", from(r, 0, 0.03, -0.035), from(r, 0, 0.02, -0.035), 0.08, 0.08);
   }
-  if (has("hips")) put("body", "hips", from(at("hips"), 0, -0.02, -0.015), from(at("hips"), 0, -0.06, -0.018), 0.085, 0.05, { k: 0.05 * u });
+  if (has("hips")) put("body", "hips", from(at("hips"), 0, -0.02, -0.01), from(at("hips"), 0, -0.045, -0.008), 0.085, 0.055, { k: 0.06 * u });
   if (has("spine", "chest")) put("body", "spine", from(at("spine"), 0, -0.02, 0.01), from(at("chest"), 0, 0, 0.012), 0.128, 0.124, { ...flat(1.26, 0.07), core: true });
   if (has("chest")) put("body", "chest", from(at("chest"), 0.035, 0.04, 0.012), from(at("chest"), -0.035, 0.04, 0.012), 0.112, 0.112, { ...flat(1.15), core: true });
   if (has("upperChest")) {
