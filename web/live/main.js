@@ -123,7 +123,12 @@ async function start() {
       page.dataset.microphone = microphone.on ? "on" : "off";
     },
     interrupt,
-    outside() { user.outside = !user.outside; press("outside", user.outside); },
+    outside() {
+      user.outside = !user.outside;
+      // From the side, so that neither hides the other.
+      user.orbit.yaw = Math.atan2(user.position[0] - root.x, user.position[2] - root.z) + 1.2;
+      press("outside", user.outside);
+    },
     theme() { page.dataset.theme = page.dataset.theme === "dark" ? "light" : "dark"; },
     more() { if ($("more").open) $("more").close(); else { figures.show(); $("more").showModal(); } },
     async report() {

@@ -7,7 +7,7 @@ const { createShapes, bodyMesh, FACE_BONES, LIDS, TINT } = new Function(`${code}
 
 const STRIDE = 36;
 // Linear, as glTF has vertex colours: skin, hair, and so on by their tint; shirt, trousers, shoes.
-const COLOURS = { [TINT.skin]: [0.27, 0.13, 0.075], [TINT.hair]: [0.011, 0.009, 0.008], [TINT.lips]: [0.22, 0.07, 0.06], [TINT.mouth]: [0.05, 0.01, 0.01] };
+const COLOURS = { [TINT.skin]: [0.40, 0.20, 0.12], [TINT.hair]: [0.011, 0.009, 0.008], [TINT.lips]: [0.33, 0.11, 0.09], [TINT.mouth]: [0.05, 0.01, 0.01] };
 const CLOTHES = [[0.72, 0.29, 0.05], [0.06, 0.075, 0.05], [0.7, 0.68, 0.62]];
 
 // `size`: of the body, against the rig's.

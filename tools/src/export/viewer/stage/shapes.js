@@ -48,7 +48,7 @@ function createShapes(d) {
     put("body", "hips", from(l, 0, 0.03, -0.035), from(l, 0, 0.02, -0.035), 0.08, 0.08);
     put("body", "hips", from(r, 0, 0.03, -0.035), from(r, 0, 0.02, -0.035), 0.08, 0.08);
   }
-  if (has("hips")) put("body", "hips", from(at("hips"), 0, -0.02, -0.01), from(at("hips"), 0, -0.045, -0.008), 0.085, 0.055, { k: 0.06 * u });
+  if (has("hips")) put("body", "hips", from(at("hips"), 0, -0.02, -0.01), from(at("hips"), 0, -0.062, -0.008), 0.085, 0.056, { k: 0.05 * u });
   if (has("spine", "chest")) put("body", "spine", from(at("spine"), 0, -0.02, 0.01), from(at("chest"), 0, 0, 0.012), 0.128, 0.124, { ...flat(1.26, 0.07), core: true });
   if (has("chest")) put("body", "chest", from(at("chest"), 0.035, 0.04, 0.012), from(at("chest"), -0.035, 0.04, 0.012), 0.112, 0.112, { ...flat(1.15), core: true });
   if (has("upperChest")) {
@@ -85,8 +85,8 @@ function createShapes(d) {
     const names = ["UpperLeg", "LowerLeg", "Foot", "Toes"].map((n) => side + n);
     if (!has(...names.slice(0, 3))) return;
     const [hip, knee, ankle] = names.slice(0, 3).map((n) => at(n));
-    put("body", names[0], from(hip, 0.004 * x, 0, 0), lerp(hip, knee, 0.45), 0.088, 0.077, { ball: 0.84 });
-    put("body", names[0], lerp(hip, knee, 0.4), knee, 0.078, 0.057, { shade: true });
+    put("body", names[0], from(hip, 0.013 * x, -0.01, 0), from(lerp(hip, knee, 0.45), 0.008 * x, 0, 0), 0.081, 0.073, { k: 0.022 * u, ball: 0.84 });
+    put("body", names[0], from(lerp(hip, knee, 0.4), 0.008 * x, 0, 0), knee, 0.074, 0.057, { k: 0.022 * u, shade: true });
     put("body", names[1], knee, lerp(knee, ankle, 0.3), 0.057, 0.056, { ball: 0.93 });
     put("body", names[1], from(lerp(knee, ankle, 0.26), 0, 0, -0.02), from(lerp(knee, ankle, 0.4), 0, 0, -0.016), 0.045, 0.042);
     put("body", names[1], lerp(knee, ankle, 0.3), ankle, 0.056, 0.038, { shade: true });
