@@ -309,6 +309,6 @@ async function start() {
   page.dataset.mode = "screen";
   requestAnimationFrame(loop);
   // For scripts in this window; other windows send messages (channel.js).
-  window.visavisLive = { agent, voice, user, xr, take, say, interrupt, setGaze, pose, behind: () => context && voice.behind(context) };
+  window.visavisLive = { agent, voice, user, xr, take, say, interrupt, setGaze, pose, face, behind: () => context && voice.behind(context) };
   if (!errors) page.dataset.state = "ready";
 }

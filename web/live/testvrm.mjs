@@ -3,7 +3,7 @@ import { readFileSync } from "node:fs";
 
 const stage = new URL("../../tools/src/export/viewer/stage/", import.meta.url);
 const code = ["math", "shapes", "mesh"].map((name) => readFileSync(new URL(`${name}.js`, stage), "utf8")).join("\n");
-const { createShapes, bodyMesh, FACE_BONES, LIDS, TINT } = new Function(`${code}\nreturn { createShapes, bodyMesh, FACE_BONES, LIDS, TINT };`)();
+const { createShapes, bodyMesh, FACE_BONES, LIDS, TINT, mix } = new Function(`${code}\nreturn { createShapes, bodyMesh, FACE_BONES, LIDS, TINT, mix };`)();
 
 const STRIDE = 36;
 // Linear, as glTF has vertex colours: skin, hair, and so on by their tint; shirt, trousers, shoes.
@@ -23,15 +23,19 @@ export function vrmOf({ joints, eyes, headBack }, size = 0.92) {
   const lowest = [Infinity, Infinity, Infinity], highest = [-Infinity, -Infinity, -Infinity];
   for (let i = 0; i < count; i++) {
     const p = [0, 4, 8].map((o) => vertices.getFloat32(STRIDE * i + o, true)), at = (o) => vertices.getUint8(STRIDE * i + o);
+    const bone = bones[at(24)];
+    if (bone.name === "mouth") { // Modelled open.
+      p[1] = mix(bone.at[1], p[1], 0.25);
+      vertices.setFloat32(STRIDE * i + 4, p[1], true);
+    }
     p.forEach((x, k) => { lowest[k] = Math.min(lowest[k], x); highest[k] = Math.max(highest[k], x); });
     colours.set([...colourOf(p, at(32), Math.hypot(at(34) / 127.5 - 1, at(35) / 127.5 - 1)).map((x) => Math.round(255 * x)), 255], 4 * i);
-    const bone = bones[at(24)];
     if (/Lid$/.test(bone.name)) { // Turned down until it meets the lower lid.
       const [y, z] = [p[1] - bone.at[1], p[2] - bone.at[2]], a = ((LIDS.open - LIDS.lower) * Math.PI) / 180, [s, c] = [Math.sin(a), Math.cos(a)];
       morphs.blink.set([0, c * y - s * z - y, s * y + c * z - z], 3 * i);
     }
     if (bone.name === "lowerLip") morphs.aa.set([0, -0.011 * shapes.unit, 0], 3 * i);
-    if (bone.name === "mouth") morphs.aa.set([0, 1.6 * (p[1] - bone.at[1]) - 0.005 * shapes.unit, 0], 3 * i);
+    if (bone.name === "mouth") morphs.aa.set([0, 6 * (p[1] - bone.at[1]) - 0.005 * shapes.unit, 0], 3 * i);
   }
   function colourOf([x, y, z], tint, off) {
     if (tint === TINT.eye) return off < 0.2 ? [0, 0, 0] : off < 0.47 ? [0.06, 0.03, 0.015] : [0.8, 0.79, 0.78];
