@@ -30,10 +30,10 @@ const take = async (words) => shots.push({ words, image: `data:image/png;base64,
 const place = (x, y, z) => live(`visavisLive.user.position = [${x}, ${y}, ${z}]`);
 await place(1.5, 1.6, 0.6); await sleep(5); await take("walk around it");
 await place(0.5, 1.6, 1.3); await sleep(6);
-await page.evaluate(() => document.querySelector("#lines button:nth-child(1)").click());
 // With its mouth open and its eyes too.
 for (let i = 0; i < 20; i++) {
-  await until((d) => d.speaking === "true" && Number(d.mouth) > 0.35, 5);
+  if ((await data()).speaking !== "true") await page.evaluate(() => document.querySelector("#lines button:nth-child(3)").click());
+  await until((d) => d.speaking === "true" && Number(d.mouth) > 0.35, 8);
   if (i) shots.pop();
   await take("let it speak");
   if (await live("visavisLive.face.open > 0.3 && visavisLive.face.blink < 0.2")) break;
