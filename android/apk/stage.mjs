@@ -39,7 +39,7 @@ const mesh = ({ data, indices }) => {
 };
 
 ints(0x47545356, d.joints.length); // "VSTG"
-floats([...d.eyes, ...d.headBack, ...shapes.cloth, ...look.floor, ...look.grid, look.dark, look.shade, ...look.tints.flat(), ...look.clothes.flat()]);
+floats([...d.eyes, ...d.headBack, ...shapes.bind.turn, ...shapes.cloth, ...shapes.sleeve, ...look.floor, ...look.grid, look.dark, look.shade, ...look.tints.flat(), ...look.clothes.flat()]);
 const capsules = shapes.all.filter((s) => s.core || s.shade).slice(0, viewer.CAPSULES - 1);
 ints(viewer.CAPSULES, capsules.length);
 for (const s of capsules) {

@@ -17,6 +17,7 @@ mod tensors;
 
 pub use audio::AudioSource;
 pub use file::{BundleFile, LoadMode};
+#[cfg(feature = "quant")]
 pub(crate) use rewrite::{Entry, assemble, entries, failed, floats};
 pub use stored::{SMALL, StoredData, StoredWeights, int16_activations};
 pub use tensors::{TensorInfo, Tensors};

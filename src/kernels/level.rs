@@ -252,9 +252,11 @@ pub(crate) mod token {
 
 /// Methods of a token, compiled for its level: `for LEVEL: fn name(self, ...) { ... }`. Their
 /// bodies call the level's intrinsics, and functions compiled for it, without `unsafe`.
+#[allow(unused_macros, reason = "as below")]
 macro_rules! compiled {
     (for $level:ident: $($functions:tt)*) => { $crate::kernels::level::features!($level, [$crate::kernels::level::compile] ($level $($functions)*)); };
 }
+#[allow(unused_macros, reason = "as below")]
 macro_rules! compile {
     ($arch:tt $features:tt
      ($level:ident $(fn $name:ident(self $(, $arg:ident: $type:ty)*) $(-> $result:ty)? $body:block)*)) => {

@@ -6,12 +6,13 @@ async function inflated(stream) {
   return new Response(stream.pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
 }
 
-function stream(id) {
+// `keep`: it may be wanted again.
+function stream(id, keep) {
   let raw;
   try { raw = atob(text(id)); } catch { throw new Error(`The page is damaged (${id}): it was not saved or copied whole. Get it again.`); }
   const bytes = new Uint8Array(raw.length);
   for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
-  document.getElementById(id).remove();
+  if (!keep) document.getElementById(id).remove();
   return new Blob([bytes]).stream();
 }
 
@@ -26,10 +27,12 @@ async function loaded(name, size, tell) {
   }));
 }
 
-export async function readAssets(tell) {
+// `wanted`: name of the model to begin with, where there are several.
+export async function readAssets(tell, wanted) {
   const files = text("files") ? JSON.parse(text("files")) : null;
-  const part = async (id) => {
-    const source = files ? await loaded(files[id], files.sizes[id], tell) : stream(id);
+  const { models, rate, names, lengths } = files?.contents ?? JSON.parse(text("contents"));
+  const part = async (id, tell = () => {}, keep = false) => {
+    const source = files ? await loaded(files[id], files.sizes[id], tell) : stream(id, keep);
     try {
       return await inflated(source);
     } catch (error) {
@@ -38,9 +41,11 @@ export async function readAssets(tell) {
     }
   };
   tell(0.02, "Unpacking the agent.");
-  const [bundle, sound, relaxed, simd128, worker] = await Promise.all(["bundle", "sound", "relaxed", "simd128", "worker"].map(part));
+  const model = (i, tell) => part(`model${i}`, tell, models.length > 1);
+  const first = Math.max(0, models.findIndex(({ name }) => name === wanted));
+  const [bundle, sound, relaxed, simd128, worker] = await Promise.all([model(first, tell), ...["sound", "relaxed", "simd128", "worker"].map((id) => part(id))]);
   const code = new TextDecoder().decode(worker);
-  const { rate, names, lengths } = files?.lines ?? JSON.parse(text("speech")), pcm = new Int16Array(sound);
+  const pcm = new Int16Array(sound);
   let at = 0;
   const lines = names.map((name, i) => {
     const samples = Float32Array.from(pcm.subarray(at, at + lengths[i]), (x) => x / 32768);
@@ -67,5 +72,5 @@ export async function readAssets(tell) {
     const url = URL.createObjectURL(new Blob([code], { type: "text/javascript" }));
     try { return new Worker(url); } finally { URL.revokeObjectURL(url); }
   };
-  return { bundle, wasm: { relaxed, simd128 }, worker: startWorker, lines, avatars: () => (avatars ??= run()) };
+  return { bundle, models, first, model, wasm: { relaxed, simd128 }, worker: startWorker, lines, avatars: () => (avatars ??= run()) };
 }

@@ -4,14 +4,17 @@
 // npm package, which web/build.sh makes before it calls this. esbuild, three and @pixiv/three-vrm come from the npm registry, by web/live/package.json.
 import { createHash } from "node:crypto";
 import { execFileSync } from "node:child_process";
-import { copyFileSync, mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { copyFileSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { dirname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 import { gzipSync } from "node:zlib";
 
 const here = dirname(fileURLToPath(import.meta.url)), root = join(here, "../.."), out = resolve(process.argv[2] ?? join(root, "out/web"));
-const bundle = process.env.VISAVIS_BUNDLE ?? join(root, "models/visavis-base-i8.safetensors");
+// The agent's models, of which the first begins: VISAVIS_BUNDLES (paths, separated by spaces), else those of models/, quantised where they are so too.
+const stems = readdirSync(join(root, "models")).filter((name) => name.endsWith(".safetensors")).map((name) => name.slice(0, -".safetensors".length));
+const shipped = stems.filter((stem) => !stems.includes(`${stem}-i8`)).sort((a, b) => b.includes("base") - a.includes("base"));
+const bundles = process.env.VISAVIS_BUNDLES?.split(" ").filter(Boolean) ?? shipped.map((stem) => join(root, "models", `${stem}.safetensors`));
 const pack = join(out, "npm"), tools = join(out, "build"), modules = join(tools, "node_modules");
 mkdirSync(tools, { recursive: true });
 copyFileSync(join(here, "package.json"), join(tools, "package.json"));
@@ -22,7 +25,7 @@ const esbuild = createRequire(join(tools, "package.json"))("esbuild");
 const stage = join(root, "tools/src/export/viewer/stage");
 const parts = ["math", "shapes", "pose", "face", "mesh", "looks", "shaders", "lines", "webgl"];
 const stageCode = `${parts.map((name) => readFileSync(join(stage, `${name}.js`), "utf8")).join("\n")}
-export { createShapes, createPose, createFace, createWebgl, css, gazeColour, add, sub, scale, unit, length, mix, clamp, lookAt, multiply, perspective };`;
+export { createShapes, createPose, createFace, createWebgl, css, gazeColour, lookRotation, rotate, add, sub, scale, unit, length, mix, clamp, lookAt, multiply, perspective };`;
 
 const plugin = {
   name: "visavis",
@@ -55,12 +58,23 @@ function sentences() {
   return { rate, names, pieces: pieces.map(([a, b]) => pcm.slice(Math.max(0, a - 800), Math.min(pcm.length, b + 1600))) };
 }
 
+// What its panel says of a bundle. All have the body that the page builds from the first.
+const configOf = (path) => {
+  const bytes = readFileSync(path), header = bytes.subarray(8, 8 + Number(bytes.readBigUInt64LE()));
+  return JSON.parse(JSON.parse(header.toString()).__metadata__.visavis);
+};
+function model(path) {
+  const { name, kind = "sarah", rig } = configOf(path);
+  if (JSON.stringify(rig) !== JSON.stringify(configOf(bundles[0]).rig)) throw new Error(`${path} has another rig than ${bundles[0]}: build a page of its own`);
+  return { name, kind };
+}
+
 const { rate, names, pieces } = sentences();
 // One piece a sentence; where pauses cut more finely, neighbours are joined in the order of the dialogue.
 const grouped = pieces.length === names.length ? pieces : null;
 const short = (text) => (text.length > 26 ? `${text.slice(0, 24).replace(/[\s,.]+\S*$/, "")} …` : text);
 const linesOf = grouped ? grouped.map((pcm, i) => ({ name: short(names[i]), pcm })) : pieces.map((pcm, i) => ({ name: `Line ${i + 1}`, pcm }));
-const lines = { rate, names: linesOf.map((l) => l.name), lengths: linesOf.map((l) => l.pcm.length) };
+const lines = { models: bundles.map(model), rate, names: linesOf.map((l) => l.name), lengths: linesOf.map((l) => l.pcm.length) };
 const sound = Buffer.concat(linesOf.map(({ pcm }) => Buffer.from(pcm.buffer, pcm.byteOffset, pcm.byteLength)));
 
 const html = readFileSync(join(here, "live.html"), "utf8"), style = readFileSync(join(here, "live.css"), "utf8");
@@ -71,7 +85,7 @@ const avatars = await bundled("vrm.js", { globalName: "visavisAvatars" });
 const packed = (bytes) => gzipSync(bytes, { level: 9 });
 // Everything large, compressed; read by assets.js.
 const large = {
-  bundle: packed(readFileSync(bundle)), sound: packed(sound), relaxed: packed(readFileSync(join(pack, "visavis-relaxed.wasm"))),
+  ...Object.fromEntries(bundles.map((path, i) => [`model${i}`, packed(readFileSync(path))])), sound: packed(sound), relaxed: packed(readFileSync(join(pack, "visavis-relaxed.wasm"))),
   simd128: packed(readFileSync(join(pack, "visavis-simd128.wasm"))), worker: packed(await bundled(join(pack, "worker.js"))),
 };
 const json = (id, value) => `<script type="application/json" id="${id}">${JSON.stringify(value).replaceAll("<", "\\u003c")}</script>`;
@@ -81,7 +95,7 @@ mkdirSync(join(out, "site"), { recursive: true });
 // One file: as base64 in elements.
 const element = (id, bytes) => `<script type="application/octet-stream" id="${id}">${bytes.toString("base64")}</script>`;
 const inside = Object.entries({ ...large, avatars: packed(avatars) }).map(([id, bytes]) => element(id, bytes));
-writeFileSync(join(out, "visavis.html"), fill({ style, script, assets: [json("speech", lines), ...inside].join("\n") }));
+writeFileSync(join(out, "visavis.html"), fill({ style, script, assets: [json("contents", lines), ...inside].join("\n") }));
 
 // A folder: beside the page, under names that change with what they hold.
 const named = (stem, end, bytes) => {
@@ -91,13 +105,13 @@ const named = (stem, end, bytes) => {
 };
 const files = Object.fromEntries(Object.entries(large).map(([id, bytes]) => [id, named(id, "gz", bytes)]));
 files.avatars = named("avatars", "js", avatars);
-const live = named("live", "js", script), sizes = { bundle: large.bundle.length };
-const site = fill({ style, script: "", assets: json("files", { ...files, sizes, lines }) })
+const live = named("live", "js", script), sizes = Object.fromEntries(bundles.map((_, i) => [`model${i}`, large[`model${i}`].length]));
+const site = fill({ style, script: "", assets: json("files", { ...files, sizes, contents: lines }) })
   .replace("<script>\n\n</script>", `<script src="${live}"></script>`).replace('<html lang="en"', '<html lang="en" data-worker="worker.js"');
 writeFileSync(join(out, "site/index.html"), site);
 const version = createHash("sha256").update(site).digest("hex").slice(0, 12);
-const kept = JSON.stringify(["./", live, ...Object.values(files)]);
-writeFileSync(join(out, "site/worker.js"), readFileSync(join(here, "offline.js"), "utf8").replace("{{version}}", version).replace('"{{files}}"', kept));
+const cached = JSON.stringify(["./", live, ...Object.values(files)]);
+writeFileSync(join(out, "site/worker.js"), readFileSync(join(here, "offline.js"), "utf8").replace("{{version}}", version).replace('"{{files}}"', cached));
 const megabytes = (file) => `${(readFileSync(file).length / 1e6).toFixed(1)} MB`;
 console.log(`${join(out, "visavis.html")}: ${megabytes(join(out, "visavis.html"))}`);
-console.log(`${join(out, "site")}/: bundle ${(large.bundle.length / 1e6).toFixed(1)} MB, page ${(script.length / 1e3).toFixed(0)} kB, avatars ${(avatars.length / 1e3).toFixed(0)} kB`);
+console.log(`${join(out, "site")}/: models ${lines.models.map(({ name }, i) => `${name} ${(large[`model${i}`].length / 1e6).toFixed(1)} MB`).join(", ")}, page ${(script.length / 1e3).toFixed(0)} kB, avatars ${(avatars.length / 1e3).toFixed(0)} kB`);

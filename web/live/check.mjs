@@ -1,11 +1,12 @@
 #!/usr/bin/env node
 // usage: check.mjs OUT SCREENSHOTS [NAME ...]
 // Tries the live page (OUT/visavis.html from disk, OUT/site served) in headless Chromium as a person would; NAMEs: only these. By web/page_check.sh.
-import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
+import { mkdirSync, readFileSync, rmSync, symlinkSync, writeFileSync } from "node:fs";
+import { execFileSync } from "node:child_process";
 import { createServer } from "node:http";
 import { createRequire } from "node:module";
 import { extname, join, resolve } from "node:path";
-import { pathToFileURL } from "node:url";
+import { fileURLToPath, pathToFileURL } from "node:url";
 import { vrmOf } from "./testvrm.mjs";
 
 const [out, shots] = process.argv.slice(2, 4).map((p) => resolve(p)), only = process.argv.slice(4);
@@ -148,6 +149,12 @@ const checks = {
         }
       });
       d = await until(page, `${mode}: the agent turned to the head`, (s) => off(s) < 40, 30);
+      const faced = await page.evaluate(() => {
+        const { position: p, rotation: [x, y, z, w] } = window.visavisLive.user, [rx, rz] = document.documentElement.dataset.root.split(",").map(Number);
+        const [fx, fz] = [2 * (x * z + w * y), 1 - 2 * (x * x + y * y)], far = Math.hypot(rx - p[0], rz - p[2]);
+        return (fx * (rx - p[0]) + fz * (rz - p[2])) / far;
+      });
+      claim(faced > 0.85, `${mode}: the user's head, which looks at the agent, is said to look elsewhere (cosine ${faced.toFixed(2)})`);
       console.log(`     ${mode}: ${off(d).toFixed(0)} degrees off the head after a quarter circle`);
     };
     await walk("vr");
@@ -159,6 +166,36 @@ const checks = {
     const d = await until(page, "left AR", (x) => x.mode === "screen", 20);
     claim(d.errors === "0", `errors: ${d.failure}`);
   },
+  async models() { // Another model by the panel, and one that is dropped: it goes on where it stands, and shows whom its joints follow.
+    const two = join(out, "two"), goldens = fileURLToPath(new URL("../../tests/goldens/", import.meta.url));
+    rmSync(two, { recursive: true, force: true });
+    mkdirSync(two);
+    for (const name of ["npm", "build"]) symlinkSync(join(out, name), join(two, name));
+    const bundles = ["tiny", "dram-tcn"].map((name) => join(goldens, `${name}.safetensors`)).join(" ");
+    execFileSync(process.execPath, [fileURLToPath(new URL("build.mjs", import.meta.url)), two], { env: { ...process.env, VISAVIS_BUNDLES: bundles } });
+    await open();
+    const page = await visit(pathToFileURL(join(two, "visavis.html")).href);
+    let d = await ready(page);
+    claim(d.model === "tiny" && d.kind === "sarah" && d.dyadic === "", `begins with ${d.model}, ${d.kind}, shares ${d.dyadic}`);
+    const choose = (i) => page.evaluate((i) => { const list = document.getElementById("model"); list.selectedIndex = i; list.dispatchEvent(new Event("change")); }, i);
+    const place = async () => (await data(page)).root.split(",").map(Number);
+    let before = await place();
+    await choose(1);
+    d = await until(page, "the other model", (x) => x.kind === "dram" && Number(x.frames) > 8 && x.dyadic !== "", 30);
+    const moved = Math.hypot(...(await place()).map((x, k) => x - before[k]));
+    claim(moved < 0.4, `it jumped by ${moved.toFixed(2)} m`);
+    claim(d.model === "tiny-tcn" && Number(d.dyadic) >= 0 && Number(d.dyadic) <= 1, `${d.model}, shares ${d.dyadic}`);
+    claim(await page.$eval("#sampling", (e) => e.hidden) && !(await page.$eval("#whom", (e) => e.hidden)), "the panel still has the other model's settings");
+    await shot(page, "dyadic");
+    await choose(0);
+    await until(page, "the first again", (x) => x.kind === "sarah" && x.model === "tiny" && Number(x.frames) > 8, 30);
+    await drop(page, readFileSync(join(goldens, "dram-lstm.safetensors")), "other.safetensors");
+    d = await until(page, "a dropped model", (x) => x.model === "tiny-lstm" && Number(x.frames) > 8, 30);
+    await drop(page, Buffer.from("no model"), "broken.safetensors");
+    d = await until(page, "a broken model is refused", (x) => /broken.safetensors cannot be used/.test(x.notice), 10);
+    claim(d.model === "tiny-lstm" && d.errors === "0", `after that: ${d.model}, ${d.errors} errors`);
+    console.log(`     ${d.notice}`);
+  },
   async broken() { // A sentence, not a blank page.
     await open();
     const says = async (name, page, words) => {
@@ -167,7 +204,7 @@ const checks = {
       console.log(`     ${name}: ${d.failure}`);
       await page.close();
     };
-    const html = readFileSync(join(out, "visavis.html"), "utf8"), at = html.indexOf('id="bundle">') + 400;
+    const html = readFileSync(join(out, "visavis.html"), "utf8"), at = html.indexOf('id="model0">') + 400;
     const file = join(out, "build/damaged.html");
     writeFileSync(file, html.slice(0, at) + "AAAABBBB" + html.slice(at + 8));
     await says("damaged", await visit(pathToFileURL(file).href), /damaged/);

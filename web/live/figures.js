@@ -19,7 +19,8 @@ export function createFigures({ agent, renderer, settings, state }) {
     const s = await agent.session.stats(), { p50, p95, p99, max } = s.blockMs, { calls, triangles } = renderer.counts();
     const frame = middle(spans, 0.5);
     return [
-      ["Model", `${agent.facts.name}, sampler ${settings.sampler}, gaze ${settings.gaze ?? "free"}`],
+      ["Model", `${agent.facts.name}${agent.facts.kind === "dram" ? "" : `, sampler ${settings.sampler}`}, gaze ${settings.gaze ?? "free"}`],
+      ...(state().dyadic ? [["Follows you", `${(100 * state().dyadic).toFixed(0)} %, mean of the joints`]] : []),
       ["Module", `${agent.facts.module} (${agent.facts.level}), visavis ${agent.facts.version}, ${(s.memoryBytes / 1e6).toFixed(0)} MB`],
       ["Block", `median ${ms(p50)}, 95 % ${ms(p95)}, 99 % ${ms(p99)}, worst ${ms(max)} of ${ms(1000 * BLOCK)}`],
       ["Speed", `${((1000 * BLOCK) / p50).toFixed(1)} times real time`],

@@ -41,11 +41,11 @@ start().catch((error) => fail(explained(error)));
 async function start() {
   if (typeof WebAssembly === "undefined") throw new Error("The agent cannot run: this browser has no WebAssembly, or it is switched off. A current Chrome, Edge, Firefox or Safari has it.");
   const progress = (share) => { $("done").style.width = `${Math.round(100 * share)}%`; };
-  const assets = await readAssets((share, what) => { progress(0.8 * share); $("says").textContent = what; });
-  const settings = { gaze: options.has("gaze") ? Number(options.get("gaze")) : 0.8, sampler: options.get("sampler") ?? "midpoint4" };
+  const assets = await readAssets((share, what) => { progress(0.8 * share); $("says").textContent = what; }, options.get("model"));
+  const settings = { gaze: options.has("gaze") ? Number(options.get("gaze")) : 0.8, sampler: options.get("sampler") ?? "midpoint4", seed: Number(options.get("seed") ?? 1) };
   $("says").textContent = "Starting the agent.";
   const agent = await createAgent({
-    bundle: assets.bundle, wasm: assets.wasm, worker: assets.worker, ...settings, seed: Number(options.get("seed") ?? 1),
+    bundle: assets.bundle, wasm: assets.wasm, worker: assets.worker, ...settings,
     onError: (error) => fail(`The agent stopped: ${explained(error)} Reload the page to go on.`),
   });
   assets.bundle = null;
@@ -88,6 +88,27 @@ async function start() {
     $("target").textContent = settings.gaze === null ? "free" : settings.gaze.toFixed(2);
   }
 
+  // Another model makes the motion from here on, where the agent stands.
+  async function become(bundle) {
+    interrupt();
+    const options = () => ({ ...settings, start: [root.x, root.z, root.yaw] });
+    await agent.become(bundle, options).catch((error) => {
+      // Without a student network there is no single step.
+      if (settings.sampler !== "single" || error.kind !== "argument") throw error;
+      settings.sampler = $("sampler").value = "midpoint4";
+      return agent.become(bundle, options);
+    });
+    introduce();
+    figures.restart();
+  }
+  // Who it is, for people and scripts.
+  function introduce() {
+    const { kind, name, module } = agent.facts;
+    Object.assign(page.dataset, { module, model: name, kind });
+    $("whom").hidden = kind !== "dram";
+    $("sampling").hidden = kind === "dram";
+  }
+
   // What a person can press ----------------------------------------------------------------------------------------------
   const press = (id, on) => $(id).setAttribute("aria-pressed", on);
   const acts = {
@@ -102,7 +123,12 @@ async function start() {
       page.dataset.microphone = microphone.on ? "on" : "off";
     },
     interrupt,
-    outside() { user.outside = !user.outside; press("outside", user.outside); },
+    outside() {
+      user.outside = !user.outside;
+      // From the side, so that neither hides the other.
+      user.orbit.yaw = Math.atan2(user.position[0] - root.x, user.position[2] - root.z) + 1.2;
+      press("outside", user.outside);
+    },
     theme() { page.dataset.theme = page.dataset.theme === "dark" ? "light" : "dark"; },
     more() { if ($("more").open) $("more").close(); else { figures.show(); $("more").showModal(); } },
     async report() {
@@ -118,6 +144,23 @@ async function start() {
   $("free").addEventListener("change", () => setGaze($("free").checked ? null : Number($("gaze").value)));
   $("sampler").value = settings.sampler;
   $("sampler").addEventListener("change", () => { settings.sampler = $("sampler").value; agent.session.setSampler(settings.sampler).catch((error) => notice(`No other sampler: ${explained(error)}`)); figures.restart(); });
+  for (const { name, kind } of assets.models) $("model").append(new Option(kind === "dram" ? `${name} (featherweight)` : name));
+  $("choose").hidden = assets.models.length < 2;
+  let chosen = $("model").selectedIndex = assets.first;
+  $("model").addEventListener("change", async () => {
+    const wanted = $("model").selectedIndex, busy = (text) => { $("busy").textContent = text; };
+    $("model").disabled = true;
+    busy("Loading.");
+    try {
+      await become(await assets.model(wanted, (_, what) => busy(what)));
+      chosen = wanted;
+    } catch (error) {
+      notice(`No other model: ${explained(error)}`);
+    }
+    $("model").selectedIndex = chosen;
+    $("model").disabled = false;
+    busy("");
+  });
   assets.lines.forEach(({ name, samples, rate }, i) => {
     const button = Object.assign(document.createElement("button"), { textContent: name, title: `Let it say this (${i + 1})` });
     button.addEventListener("click", () => say(samples, rate, name));
@@ -133,7 +176,13 @@ async function start() {
   // Files ------------------------------------------------------------------------------------------------------------------
   async function take(file) {
     try {
-      const bytes = await file.arrayBuffer(), magic = new TextDecoder().decode(bytes.slice(0, 4));
+      const bytes = await file.arrayBuffer();
+      if (file.name.endsWith(".safetensors")) {
+        await become(bytes);
+        $("model").selectedIndex = chosen = -1;
+        return notice(`${agent.facts.name} makes the motion now.`);
+      }
+      const magic = new TextDecoder().decode(bytes.slice(0, 4));
       if (magic !== "glTF") {
         const { samples, rate } = await decoded(bytes).catch(() => { throw new Error("it is no sound that this browser decodes, and no VRM"); });
         await say(samples, rate, file.name);
@@ -169,7 +218,7 @@ async function start() {
   const xr = createXr(renderer.gl, {
     agentRoot: () => root,
     frame: (time, views, framebuffer, seeThrough) => draw(time, views, framebuffer, seeThrough),
-    onHead(position) { user.position = position; tell(); },
+    onHead(position, rotation) { Object.assign(user, { position, rotation }); tell(); },
     onGaze: (step) => setGaze(step === null ? null : (settings.gaze ?? 0.5) + step),
     onInterrupt: interrupt,
     onChange() {
@@ -186,7 +235,7 @@ async function start() {
 
   // The picture ------------------------------------------------------------------------------------------------------------
   let before = performance.now(), ratio = Number(options.get("pixels")) || Math.min(2, window.devicePixelRatio || 1), slow = 0, drawn = 0;
-  const tell = () => agent.session.pushUserHead(...user.position);
+  const tell = () => agent.session.pushUserHead(...user.position, undefined, user.rotation);
 
   // Where the frame time is over what 60 a second allow for two seconds, fewer pixels are drawn.
   function adapt(seconds) {
@@ -213,6 +262,8 @@ async function start() {
     pose.set(moment.from, moment.to, moment.share);
     root = { x: pose.root[0], z: pose.root[2], yaw: moment.from.yaw };
     pose.user = user.position;
+    if (!user.inHeadset && pose.eyes) user.face(pose.eyes);
+    if (!$("dyadic").checked) pose.dyadic = null;
     face.update(pose, agent.now(), level, seconds);
     for (const view of views) view.target ??= pose.root;
     const outside = user.outside && !xr.mode;
@@ -227,18 +278,20 @@ async function start() {
   }
   const window_lines = () => [{ from: [user.position[0], 0.006, user.position[2]], to: add(user.position, [0, -0.14, 0]), width: 0.006, c0: [0.75, 0.47, 0.89, 0.8], c1: [0.75, 0.47, 0.89, 0.15], flat: false }];
 
+  const mean = (shares) => (shares ? (shares.reduce((sum, x) => sum + x, 0) / shares.length).toFixed(3) : "");
+
   // In words for people, in data for scripts.
   function inform() {
     const moment = agent.at(), gaze = moment.from.gaze, saying = voice.saying(), speaking = voice.speaking(), data = page.dataset, p = user.position;
     const { calls, triangles } = renderer.counts();
     Object.assign(data, {
-      frames: Math.round(agent.computed() * 30), drawn, speaking, mouth: face.open.toFixed(2), gaze: Number.isNaN(gaze) ? "" : gaze.toFixed(3), calls, triangles,
+      frames: Math.round(agent.computed() * 30), drawn, speaking, mouth: face.open.toFixed(2), gaze: Number.isNaN(gaze) ? "" : gaze.toFixed(3), dyadic: mean(moment.from.dyadic), calls, triangles,
       root: `${root.x.toFixed(3)},${root.z.toFixed(3)}`, yaw: root.yaw.toFixed(4), user: p.map((x) => x.toFixed(3)).join(","), bearing: Math.atan2(p[0] - root.x, p[2] - root.z).toFixed(4),
     });
     $("interrupt").disabled = !speaking;
     $("level").style.setProperty("--level", Math.min(1, microphone.level * 5).toFixed(2));
     $("scored").textContent = Number.isNaN(gaze) ? "–" : gaze.toFixed(2);
-    $("score").style.background = css(gazeColour(Number.isNaN(gaze) ? 0 : gaze));
+    $("score").style.background = Number.isNaN(gaze) ? "" : css(gazeColour(gaze));
     for (const button of $("lines").children) button.dataset.on = saying === button.textContent;
     const says = !moment.from.index && !agent.computed() ? "Starting." : speaking ? "It is speaking." : microphone.on ? (microphone.level > 0.02 ? "It hears you." : "It listens.") : "Walk around it, let it speak, or talk to it.";
     if ($("says").textContent !== says) $("says").textContent = says;
@@ -252,10 +305,10 @@ async function start() {
   for (const [name, k] of [["x", 0], ["z", 2]]) if (options.has(name)) user.position[k] = Number(options.get(name));
   $("welcome").hidden = true;
   $("desk").hidden = false;
-  page.dataset.module = agent.facts.module;
+  introduce();
   page.dataset.mode = "screen";
   requestAnimationFrame(loop);
   // For scripts in this window; other windows send messages (channel.js).
-  window.visavisLive = { agent, voice, user, xr, take, say, interrupt, setGaze, pose, behind: () => context && voice.behind(context) };
+  window.visavisLive = { agent, voice, user, xr, take, say, interrupt, setGaze, pose, face, behind: () => context && voice.behind(context) };
   if (!errors) page.dataset.state = "ready";
 }

@@ -29,18 +29,24 @@ const shots = [];
 const take = async (words) => shots.push({ words, image: `data:image/png;base64,${await page.screenshot({ encoding: "base64" })}` });
 const place = (x, y, z) => live(`visavisLive.user.position = [${x}, ${y}, ${z}]`);
 await place(1.5, 1.6, 0.6); await sleep(5); await take("walk around it");
-await place(0.5, 1.6, 1.1); await sleep(3);
-await page.evaluate(() => document.querySelector("#lines button:nth-child(3)").click());
-await until((d) => d.speaking === "true" && Number(d.mouth) > 0.35); await take("let it speak");
+await place(0.5, 1.6, 1.3); await sleep(6);
+// With its mouth open and its eyes too.
+for (let i = 0; i < 20; i++) {
+  if ((await data()).speaking !== "true") await page.evaluate(() => document.querySelector("#lines button:nth-child(3)").click());
+  await until((d) => d.speaking === "true" && Number(d.mouth) > 0.35, 8);
+  if (i) shots.pop();
+  await take("let it speak");
+  if (await live("visavisLive.face.open > 0.3 && visavisLive.face.blink < 0.2")) break;
+}
 await live("visavisLive.interrupt()"); await sleep(1.2); await take("interrupt it");
 await live("visavisLive.setGaze(0)"); await sleep(8); await take("less eye contact");
-await live("visavisLive.setGaze(0.8)"); await place(1.1, 1.6, 1.6);
+await live("visavisLive.setGaze(1)"); await place(0.5, 1.6, 1.35);
 const facts = await live("({ ...visavisLive.agent.facts })"), bytes = vrmOf(facts).toString("base64");
 await page.evaluate((text) => visavisLive.take(new File([Uint8Array.from(atob(text), (c) => c.charCodeAt(0))], "body.vrm")), bytes);
-await until((d) => d.avatar, 60); await sleep(2); await take("a VRM drives along");
+await until((d) => d.avatar, 60); await until((d) => Number(d.gaze) > 0.9, 20); await sleep(1); await take("a VRM drives along");
 await page.evaluate(() => document.getElementById("own-body").click());
 await live("(() => { const n = 48000, s = new Float32Array(n); for (let i = 0; i < n; i++) s[i] = 0.4 * Math.sin(i * 0.05) * Math.sin(i * 0.0006) ** 2; visavisLive.say(s, 24000, 'a sound'); })()");
-await live("visavisLive.user.outside = true"); await sleep(1.4); await take("a dropped sound");
+await live("document.getElementById('outside').click()"); await sleep(1.4); await take("a dropped sound");
 
 // Three by two, with words under each.
 const sheet = await browser.newPage();

@@ -1,11 +1,11 @@
 // Where the user is: eyes 1.65 m above the floor, walking with keys, fingers, a gamepad, or a headset. Looks at the agent.
-import { add, clamp, length, lookAt, mix, multiply, perspective, scale, sub, unit } from "./stage.js";
+import { add, clamp, length, lookAt, lookRotation, mix, multiply, perspective, scale, sub } from "./stage.js";
 
 const HEIGHT = 1.65;
 const SPEED = { walk: 1.3, turn: 1.0 };
 
 export function createUser(canvas) {
-  const user = { position: [0, HEIGHT, 2.1], inHeadset: false, outside: false, orbit: { yaw: 0.7, pitch: 0.2, distance: 4.6 }, moved: 0 };
+  const user = { position: [0, HEIGHT, 2.1], rotation: [0, 1, 0, 0], inHeadset: false, outside: false, orbit: { yaw: 0.7, pitch: 0.2, distance: 4.6 }, moved: 0 };
   const held = new Set(), pointers = new Map();
   let focus = [0, 1.2, 0];
 
@@ -87,7 +87,7 @@ export function createUser(canvas) {
     return { eye, target: focus, projection, camera, matrix: multiply(projection, camera) };
   };
 
-  // Ahead of the user's eyes, on the floor's plane.
-  user.facing = () => unit(sub(focus, user.position));
+  // On a screen the user's face points to what is looked at: the agent's.
+  user.face = (eyes) => { user.rotation = lookRotation(sub(eyes, user.position)); };
   return user;
 }

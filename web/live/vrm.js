@@ -23,7 +23,7 @@ export async function createAvatar(bytes, { canvas, gl, rig }) {
   camera.matrixAutoUpdate = camera.matrixWorldAutoUpdate = false;
   const key = new DirectionalLight(0xfff2e2, 2.0);
   key.position.set(0.41, 0.8, 0.44);
-  scene.add(vrm.scene, key, new HemisphereLight(0xdde6ff, 0x55504c, 1.3));
+  scene.add(vrm.scene, key, new HemisphereLight(0xe4ebff, 0x8a837c, 1.6));
   vrm.scene.traverse((node) => { node.frustumCulled = false; });
   const flipped = vrm.meta?.metaVersion === "0" ? -1 : 1;
   const place = new Vector3();

@@ -56,6 +56,7 @@ export function createXr(gl, { agentRoot, frame, onHead, onGaze, onInterrupt, on
     xr.first = null;
     lie = {
       // A point of the headset's floor in the world, and the world's matrix in the headset's.
+      turn: [0, Math.sin(turn / 2), 0, Math.cos(turn / 2)],
       at: ({ x: a, y: b, z: d }) => [ox + c * a + s * d, b, oz - s * a + c * d],
       back: [c, 0, s, 0, 0, 1, 0, 0, -s, 0, c, 0, s * oz - c * ox, 0, -s * ox - c * oz, 1],
     };
@@ -69,7 +70,9 @@ export function createXr(gl, { agentRoot, frame, onHead, onGaze, onInterrupt, on
     if (!lie) lay(pose);
     const head = lie.at(pose.transform.position), layer = session.renderState.baseLayer;
     xr.first ??= { user: head, agent: { ...agentRoot() } };
-    onHead(head);
+    // A headset that is not turned looks along -Z, ours along +Z: half a turn first.
+    const { x, y, z, w } = pose.transform.orientation;
+    onHead(head, turned(lie.turn, turned([x, y, z, w], [0, 1, 0, 0])));
     sticks();
     const views = pose.views.map((view) => {
       const camera = multiply(view.transform.inverse.matrix, lie.back);
@@ -79,6 +82,11 @@ export function createXr(gl, { agentRoot, frame, onHead, onGaze, onInterrupt, on
       };
     });
     frame(time, views, layer.framebuffer, session.environmentBlendMode !== "opaque" || xr.mode === "ar");
+  }
+
+  // One quaternion after another: first b, then a.
+  function turned([x, y, z, w], [a, b, c, d]) {
+    return [w * a + x * d + y * c - z * b, w * b - x * c + y * d + z * a, w * c + x * b - y * a + z * d, w * d - x * a - y * b - z * c];
   }
 
   // A stick pushed up or down raises or lowers the gaze target.

@@ -128,6 +128,10 @@ class SessionCore {
     this.core.do("visavis_push_head", this.pointer, x, y, z, time);
   }
 
+  pushPose(x, y, z, [qx, qy, qz, qw], time) {
+    this.core.do("visavis_push_pose", this.pointer, x, y, z, qx, qy, qz, qw, time);
+  }
+
   setGaze(target) {
     this.core.do("visavis_set_gaze", this.pointer, target ?? NaN);
   }
@@ -149,16 +153,18 @@ class SessionCore {
     return this.core.call("visavis_next_due", this.pointer);
   }
 
-  /** The next block if it is due, as one buffer: numbers of all frames (f64), then joints (f32); else null. */
+  /** The next block if it is due, as one buffer: numbers of all frames (f64), then joints, and shares where there are any (f32); else null. */
   poll(now) {
     const outcome = this.core.call("visavis_poll", this.pointer, now);
     if (outcome < 0) throw VisavisError.ofStatus(-outcome, this.core.text());
     if (outcome === 0) return null;
     const numbers = BLOCK_FRAMES * FRAME_NUMBERS * 8, joints = BLOCK_FRAMES * this.joints * JOINT_NUMBERS * 4;
-    const block = new Uint8Array(numbers + joints);
+    const shares = this.core.call("visavis_shares_length", this.pointer) * 4;
+    const block = new Uint8Array(numbers + joints + shares);
     const part = (name, at, bytes) => block.set(new Uint8Array(this.core.buffer, this.core.call(name, this.pointer), bytes), at);
     part("visavis_numbers", 0, numbers);
     part("visavis_joints", numbers, joints);
+    part("visavis_shares", numbers + joints, shares);
     return block.buffer;
   }
 

@@ -8,13 +8,14 @@ const FPS = 30;
 /** The frames of a block (`SessionCore.poll`): views into its buffer. */
 export function framesOf(block, joints) {
   const numbers = new Float64Array(block, 0, BLOCK_FRAMES * FRAME_NUMBERS);
-  const floats = new Float32Array(block, numbers.byteLength);
+  const floats = new Float32Array(block, numbers.byteLength), size = joints * JOINT_NUMBERS;
+  const shares = floats.subarray(BLOCK_FRAMES * size);
   return Array.from({ length: BLOCK_FRAMES }, (_, i) => {
     const [index, time, x, z, yaw, hx, hy, hz, fitError, gaze, sampler, held] = numbers.subarray(i * FRAME_NUMBERS, (i + 1) * FRAME_NUMBERS);
-    const size = joints * JOINT_NUMBERS;
     return {
       index, time, root: { x, z, yaw }, hips: [hx, hy, hz], fitError, gaze: Number.isNaN(gaze) ? null : gaze,
       sampler: samplerName(sampler), held, joints: floats.subarray(i * size, (i + 1) * size),
+      dyadic: shares.length ? shares.subarray(i * joints, (i + 1) * joints) : null,
     };
   });
 }

@@ -123,6 +123,10 @@ export function serve(port) {
       this.#session.pushHead(x, y, z, time);
     }
 
+    pushPose(x, y, z, rotation, time) {
+      this.#session.pushPose(x, y, z, rotation, time);
+    }
+
     setGaze(target) {
       this.#session.setGaze(target);
     }

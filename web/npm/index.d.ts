@@ -62,6 +62,8 @@ export interface Engine {
 
 export interface EngineFacts {
   version: string;
+  /** What the bundle is for: the conversation model, or the featherweight tier, which is deterministic and has no samplers. */
+  kind: "sarah" | "dram";
   /** Name and licence of the bundle, with the acknowledgements that its data asks for. */
   name: string;
   licence: string;
@@ -120,8 +122,11 @@ export interface Session {
   /** Receives what went wrong later; after kind `fault` the session has ended. */
   onError: ((error: VisavisError) => void) | null;
 
-  /** Where the midpoint of the user's eyes is, world metres, Y up, at session time `time` (default: now). Any rate. */
-  pushUserHead(x: number, y: number, z: number, time?: number): void;
+  /**
+   * Where the midpoint of the user's eyes is, world metres, Y up, at session time `time` (default: now). Any rate. `rotation`: the
+   * head's in the world, a quaternion x, y, z, w of about unit length, identity where the user faces +Z; bundles of the kind `dram` use it.
+   */
+  pushUserHead(x: number, y: number, z: number, time?: number, rotation?: ArrayLike<number> | null): void;
   /** Sound of the user: mono, full scale 1, `rate` 8000 to 192000 Hz. Pushed as it is heard. */
   pushUserVoice(samples: Float32Array, rate: number): void;
   /**
@@ -175,6 +180,11 @@ export interface Frame {
    * bone lengths (hips: to the world), for humanoid rigs; then the decoded position and rotation (from the T-pose) in the world.
    */
   joints: Float32Array;
+  /**
+   * How much each joint follows the user rather than the agent's own voice and habit, 0 to 1, in the order of the joints: the
+   * read-out of bundles of the kind `dram`; null with others.
+   */
+  dyadic: Float32Array | null;
 }
 
 export interface SessionStats {

@@ -42,10 +42,14 @@ export class Session {
     return this.#paused ?? (wall() - this.#origin) / 1000;
   }
 
-  pushUserHead(x, y, z, time = this.time) {
+  pushUserHead(x, y, z, time = this.time, rotation = null) {
     // Positions that are no numbers are counted (stats().head.nonFinite), as in every other language.
     [x, y, z, time].forEach((v) => typed("a head position", "numbers", typeof v === "number"));
-    this.#tell("pushHead", [x, y, z, time]);
+    if (rotation === null) return this.#tell("pushHead", [x, y, z, time]);
+    // A page's own array may be any kind of list: four numbers of it go.
+    const turn = Array.from(typeof rotation === "object" ? rotation : []);
+    typed("a head's rotation", "four numbers x, y, z, w, or null", turn.length === 4 && turn.every((v) => typeof v === "number"));
+    this.#tell("pushPose", [x, y, z, turn, time]);
   }
 
   pushUserVoice(samples, rate) {

@@ -11,6 +11,7 @@ use visavis::{BLOCK_FRAMES, Engine, FPS};
 #[serde(rename_all = "camelCase")]
 struct Facts<'a> {
     version: &'static str,
+    kind: &'static str,
     name: &'a str,
     licence: &'a str,
     level: &'static str,
@@ -62,6 +63,7 @@ pub unsafe extern "C" fn visavis_engine_facts(engine: *const Engine) {
     let joints = rig.joints.iter().map(|j| JointFacts { name: &j.name, parent: j.parent, offset: j.offset }).collect();
     let facts = Facts {
         version: env!("CARGO_PKG_VERSION"),
+        kind: engine.kind(),
         name: engine.name(),
         licence: engine.licence(),
         level: engine.cpu_level(),

@@ -1,4 +1,5 @@
-//! Frames as JavaScript reads them: for each frame its numbers (f64), then its joints (f32).
+//! Frames as JavaScript reads them: each frame's numbers (f64), its joints (f32), and where the bundle
+//! tells them its joints' shares (f32).
 
 use visavis::{Frame, Sampler};
 
@@ -12,12 +13,17 @@ pub const JOINT_NUMBERS: usize = 11;
 pub(crate) struct Block {
     numbers: Vec<f64>,
     joints: Vec<f32>,
+    shares: Vec<f32>,
 }
 
 impl Block {
     pub(crate) fn new(joints: usize) -> Self {
         let frames = visavis::BLOCK_FRAMES;
-        Self { numbers: vec![0.0; frames * FRAME_NUMBERS], joints: vec![0.0; frames * joints * JOINT_NUMBERS] }
+        Self {
+            numbers: vec![0.0; frames * FRAME_NUMBERS],
+            joints: vec![0.0; frames * joints * JOINT_NUMBERS],
+            shares: Vec::with_capacity(frames * joints),
+        }
     }
 
     pub(crate) fn fill(&mut self, frames: &[Frame]) {
@@ -30,6 +36,8 @@ impl Block {
             out[4..7].copy_from_slice(&global.position.to_array());
             out[7..].copy_from_slice(&global.rotation.to_array());
         }
+        self.shares.clear();
+        self.shares.extend(frames.iter().flat_map(|f| &f.dyadic));
     }
 
     pub(crate) fn numbers(&self) -> &[f64] {
@@ -38,6 +46,10 @@ impl Block {
 
     pub(crate) fn joints(&self) -> &[f32] {
         &self.joints
+    }
+
+    pub(crate) fn shares(&self) -> &[f32] {
+        &self.shares
     }
 }
 

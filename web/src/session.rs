@@ -3,7 +3,7 @@
 use crate::frames::Block;
 use crate::status::{refuse, status, tell};
 use crate::{engine, options, slice, stats};
-use visavis::glam::Vec3;
+use visavis::glam::{Quat, Vec3};
 use visavis::{Engine, Result, Session, Speaker, VoiceInput};
 
 /// One conversation with one user, and its last block.
@@ -111,6 +111,25 @@ pub unsafe extern "C" fn visavis_push_head(session: *mut Conversation, x: f32, y
     unsafe { with(session, |s| s.push_user_head(Vec3::new(x, y, z), time)) }
 }
 
+/// As [`visavis_push_head`], with the head's rotation: a quaternion of about unit length in the world,
+/// identity where the user faces +Z.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_push_pose(
+    session: *mut Conversation,
+    x: f32,
+    y: f32,
+    z: f32,
+    qx: f32,
+    qy: f32,
+    qz: f32,
+    qw: f32,
+    time: f64,
+) -> i32 {
+    let rotation = Quat::from_xyzw(qx, qy, qz, qw);
+    // SAFETY: the chapter on ownership.
+    unsafe { with(session, |s| s.push_user_pose(Vec3::new(x, y, z), Some(rotation), time)) }
+}
+
 /// Sets the gaze target, -1 to 1; NaN leaves the gaze free.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_set_gaze(session: *mut Conversation, target: f32) -> i32 {
@@ -176,6 +195,21 @@ pub unsafe extern "C" fn visavis_numbers(session: *const Conversation) -> *const
 pub unsafe extern "C" fn visavis_joints(session: *const Conversation) -> *const f32 {
     // SAFETY: the chapter on ownership.
     unsafe { &*session }.block.joints().as_ptr()
+}
+
+/// How much each joint of the last block's frames follows the user, 0 to 1, f32: as many for a frame as
+/// the rig has joints, or none at all ([`visavis_shares_length`]).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_shares(session: *const Conversation) -> *const f32 {
+    // SAFETY: the chapter on ownership.
+    unsafe { &*session }.block.shares().as_ptr()
+}
+
+/// Numbers at [`visavis_shares`]: 0 with bundles that do not tell them.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_shares_length(session: *const Conversation) -> usize {
+    // SAFETY: the chapter on ownership.
+    unsafe { &*session }.block.shares().len()
 }
 
 /// Tells the session's statistics as JSON.

@@ -50,6 +50,12 @@ fn head(n: usize) -> [f64; 3] {
     [way, 1.6, 1.5 + 0.25 * way]
 }
 
+/// Its rotation there, by Pythagorean numbers: turned about the vertical on the way there, nodding
+/// on the way back.
+fn turned(n: usize) -> [f64; 4] {
+    if n % 576 < 288 { [0.0, 0.8, 0.0, 0.6] } else { [0.28, 0.0, 0.0, 0.96] }
+}
+
 /// FNV-1a of 32-bit words in two lanes.
 struct Digest([u32; 2]);
 
@@ -60,10 +66,11 @@ impl Digest {
     }
 }
 
-fn motion(engine: *const Engine, options: &str, blocks: usize) -> String {
+/// With `rotations` the head is pushed with its own.
+fn motion(engine: *const Engine, options: &str, blocks: usize, rotations: bool) -> String {
     let conversation = session(engine, options).unwrap();
     // SAFETY: alive.
-    let joints = unsafe { &*engine }.rig().len();
+    let (joints, kind) = unsafe { ((*engine).rig().len(), (*engine).kind()) };
     let seconds = blocks * 4 / 30 + 1;
     let (agent, user) = (voice(1, seconds * AGENT_RATE, AGENT_RATE), voice(2, seconds * USER_RATE, USER_RATE));
     let mut digest = Digest([0x811c_9dc5, 0x811c_9dc5 ^ 0xffff]);
@@ -74,7 +81,13 @@ fn motion(engine: *const Engine, options: &str, blocks: usize) -> String {
         }
         for n in 0..seconds * 72 {
             let [x, y, z] = head(n).map(|v| v as f32);
-            assert_eq!(visavis_push_head(conversation, x, y, z, n as f64 / 72.0), 0);
+            let time = n as f64 / 72.0;
+            let [a, b, c, d] = turned(n).map(|v| v as f32);
+            let status = match rotations {
+                true => visavis_push_pose(conversation, x, y, z, a, b, c, d, time),
+                false => visavis_push_head(conversation, x, y, z, time),
+            };
+            assert_eq!(status, 0);
         }
         for _ in 0..blocks {
             assert_eq!(visavis_poll(conversation, visavis_next_due(conversation)), 1, "{}", text());
@@ -84,8 +97,10 @@ fn motion(engine: *const Engine, options: &str, blocks: usize) -> String {
                 digest.add(bits as u32);
                 digest.add((bits >> 32) as u32);
             }
+            let shares = slice(visavis_shares(conversation), visavis_shares_length(conversation));
+            assert_eq!(shares.len(), if kind == "dram" { BLOCK_FRAMES * joints } else { 0 });
             let joints = slice(visavis_joints(conversation), BLOCK_FRAMES * joints * JOINT_NUMBERS);
-            joints.iter().for_each(|v| digest.add(v.to_bits()));
+            joints.iter().chain(shares).for_each(|v| digest.add(v.to_bits()));
         }
         visavis_session_free(conversation);
     }
@@ -105,6 +120,8 @@ fn motion_is_that_of_the_file_that_webassembly_is_compared_with() {
         (tiny, 24, r#"{"sampler":"midpoint1","gaze":0.8}"#),
         (tiny, 24, r#"{"sampler":"euler:5","gaze":0.25,"guidance":3}"#),
         (tiny, 24, r#"{"sampler":"single","start":[1,2,0.5]}"#),
+        ("tests/goldens/dram-tcn.safetensors", 40, r#"{"gaze":0.8}"#),
+        ("tests/goldens/dram-lstm.safetensors", 40, "{}"),
         (shipped, 100, r#"{"sampler":"single"}"#),
         (shipped, 20, r#"{"sampler":"midpoint4","gaze":0.8}"#),
     ];
@@ -113,7 +130,7 @@ fn motion_is_that_of_the_file_that_webassembly_is_compared_with() {
         if bundle != engine_of {
             (engine_of, loaded) = (bundle, engine(bundle));
         }
-        writeln!(lines, "{bundle} {blocks} {options} {}", motion(loaded, options, blocks)).unwrap();
+        writeln!(lines, "{bundle} {blocks} {options} {}", motion(loaded, options, blocks, bundle.contains("dram"))).unwrap();
     }
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/digests.txt");
     if std::env::var("VISAVIS_DIGESTS").is_ok_and(|v| v == "write") {
@@ -132,6 +149,7 @@ fn what_is_wrong_has_a_status_and_a_text() {
         let engine = engine("tests/goldens/tiny.safetensors");
         visavis_engine_facts(engine);
         assert!(text().contains(r#""fps":30,"blockFrames":4"#), "{}", text());
+        assert!(text().contains(r#""kind":"sarah""#), "{}", text());
         for (options, part) in [
             ("{", "options of the session"),
             (r#"{"colour":1}"#, "unknown field `colour`"),

@@ -78,6 +78,36 @@ test("while nobody knows where the user is, there is no gaze score", async () =>
   engine.close();
 });
 
+test("bundles of the kind dram see the head's rotation and tell whom the joints follow; others do neither", async () => {
+  const motion = async (bundle, rotation) => {
+    const engine = await load({ bundle });
+    const session = engine.session({ clock: "manual", sampler: "midpoint1" });
+    const frames = [];
+    session.onFrames = (four) => frames.push(...four);
+    for (let n = 0; n < 60; n++) session.pushUserHead(0.3, 1.6, 1.2, n / 30, rotation);
+    await session.advance(2);
+    const { head } = await session.stats();
+    engine.close();
+    return { kind: engine.facts.kind, joints: engine.facts.joints.length, frames, head, bits: Buffer.concat(frames.map((f) => Buffer.from(f.joints.slice().buffer))) };
+  };
+  const away = Float32Array.of(0, 0, 0, 1);
+  const [seen, unseen] = [await motion("tests/goldens/dram-tcn.safetensors", away), await motion("tests/goldens/dram-tcn.safetensors", null)];
+  assert.equal(seen.kind, "dram");
+  assert.ok(seen.frames.length >= 60 && seen.frames.every(({ dyadic }) => dyadic.length === seen.joints && dyadic.every((share) => share >= 0 && share <= 1)));
+  assert.ok(seen.frames.some(({ dyadic }) => dyadic.some((share) => share > 0)));
+  assert.ok(!seen.bits.equals(unseen.bits));
+  const [one, other] = [await motion("tests/goldens/tiny.safetensors", [...away]), await motion("tests/goldens/tiny.safetensors")];
+  assert.equal(one.kind, "sarah");
+  assert.ok(one.frames.every(({ dyadic }) => dyadic === null));
+  assert.ok(one.bits.equals(other.bits));
+  const broken = await motion("tests/goldens/dram-tcn.safetensors", [0, NaN, 0, 1]);
+  assert.equal(broken.head.nonFinite, 60);
+  const engine = await load();
+  const session = engine.session({ clock: "manual" });
+  for (const rotation of [[0, 0, 1], "up", 1, [0, 0, 0, "1"]]) assert.throws(() => session.pushUserHead(0, 1.6, 1, 0, rotation), kind("argument", /rotation/));
+  engine.close();
+});
+
 test("in real time a block comes every 133 ms, pauses stop it", async () => {
   const engine = await load();
   const session = engine.session({ sampler: "single" });

@@ -19,12 +19,15 @@ export function head(n) {
   return [way, 1.6, 1.5 + 0.25 * way];
 }
 
-/** Pushes all that a session of `blocks` blocks hears and sees. */
-export function fill(session, blocks) {
+/** Its rotation there. */
+const turned = (n) => (n % 576 < 288 ? [0, 0.8, 0, 0.6] : [0.28, 0, 0, 0.96]);
+
+/** Pushes all that a session of `blocks` blocks hears and sees; with `rotations` the head's own. */
+export function fill(session, blocks, rotations = false) {
   const seconds = Math.floor((blocks * 4) / 30) + 1;
   session.pushAgentVoice(voice(1, seconds * AGENT_RATE, AGENT_RATE), AGENT_RATE);
   session.pushUserVoice(voice(2, seconds * USER_RATE, USER_RATE), USER_RATE);
-  for (let n = 0; n < seconds * 72; n++) session.pushUserHead(...head(n), n / 72);
+  for (let n = 0; n < seconds * 72; n++) session.pushUserHead(...head(n), n / 72, rotations ? turned(n) : null);
 }
 
 const SAMPLERS = { single: 0, midpoint4: 4, midpoint2: 2, midpoint1: 1 };
@@ -42,7 +45,8 @@ export class Digest {
         this.#add(Number.isNaN(v) ? 0 : words[1]);
       }
     }
-    for (const f of frames) new Uint32Array(f.joints.slice().buffer).forEach((word) => this.#add(word));
+    const parts = [...frames.map((f) => f.joints), ...frames.map((f) => f.dyadic ?? new Float32Array())];
+    for (const part of parts) new Uint32Array(part.slice().buffer).forEach((word) => this.#add(word));
   }
 
   #add(word) {
@@ -64,11 +68,11 @@ export function cases(text) {
 }
 
 /** The digest of a case's motion, on `engine`. */
-export async function motion(engine, { blocks, options }) {
+export async function motion(engine, { bundle, blocks, options }) {
   const session = engine.session({ ...options, clock: "manual" });
   const digest = new Digest();
   session.onFrames = (frames) => digest.frames(frames);
-  fill(session, blocks);
+  fill(session, blocks, bundle.includes("dram"));
   await session.advance((blocks * 4) / 30 - 0.01);
   session.close();
   return digest.toString();

@@ -48,9 +48,9 @@ function createCanvas2d(canvas, d, shapes) {
   function colourOf(shape, look) {
     if (shape.tint) return look.tints[shape.tint];
     const y = 0.5 * (shape.a[1] + shape.b[1]), x = Math.abs(0.5 * (shape.a[0] + shape.b[0]));
-    const [sole, waist, collar, cuff] = shapes.cloth;
+    const [sole, waist, collar] = shapes.cloth, [cos, sin, cuff, least] = shapes.sleeve;
     if (y < sole) return look.clothes[2];
-    if (x > cuff || (y > collar - 0.01 && x < 0.05)) return look.tints[TINT.skin];
+    if ((x > least && x * cos + y * sin > cuff) || (y > collar - 0.01 && x < 0.05)) return look.tints[TINT.skin];
     return y < waist ? look.clothes[1] : look.clothes[0];
   }
 

@@ -108,7 +108,7 @@ function appendSurface(mesh, shapes, cell, parents) {
     const e = 0.75 * cell;
     const slope = (k) => { const q = [0, 0, 0]; q[k] = e; return field.sample(add(p, q)) - field.sample(sub(p, q)); };
     const normal = unit([slope(0), slope(1), slope(2)]);
-    // Ambient occlusion in the rest pose: how much nearer than expected other surfaces are, going out along the normal.
+    // Ambient occlusion in the bind pose: how much nearer than expected other surfaces are, going out along the normal.
     let shade = 0;
     for (const h of [0.02, 0.045, 0.08]) shade += clamp(h - field.sample(add(p, scale(normal, h))), 0, h) / h;
     const distances = shapes.map((shape) => distanceTo(shape, ...p));

@@ -43,19 +43,24 @@ layout(location = 2) in vec4 aBones;
 layout(location = 3) in vec4 aWeights;
 layout(location = 4) in vec4 aLook;
 uniform vec4 uBones[${3 * bones}];
+uniform float uShares[${bones}];
 uniform mat4 uView;
 out vec3 vWorld, vNormal, vRest;
 flat out float vTint;
 out float vOcclusion;
 out vec2 vLook;
+out float vShare;
 void main() {
   vec4 r0 = vec4(0.0), r1 = vec4(0.0), r2 = vec4(0.0);
+  float share = 0.0;
   for (int i = 0; i < 4; i++) {
     int b = 3 * int(aBones[i] + 0.5);
     r0 += aWeights[i] * uBones[b];
     r1 += aWeights[i] * uBones[b + 1];
     r2 += aWeights[i] * uBones[b + 2];
+    share += aWeights[i] * uShares[int(aBones[i] + 0.5)];
   }
+  vShare = share;
   vec4 p = vec4(aPosition, 1.0);
   vWorld = vec3(dot(r0, p), dot(r1, p), dot(r2, p));
   vNormal = vec3(dot(r0.xyz, aNormal), dot(r1.xyz, aNormal), dot(r2.xyz, aNormal));
@@ -71,10 +76,15 @@ in vec3 vWorld, vNormal, vRest;
 flat in float vTint;
 in float vOcclusion;
 in vec2 vLook;
+in float vShare;
+// Colours of bones that go their own way and of those that follow the user; w: how strongly, 0 for none.
+uniform vec4 uOwn;
+uniform vec4 uFollows;
 uniform vec3 uEye;
 uniform vec3 uTints[9];
 uniform vec3 uClothes[3];
-uniform vec4 uCloth;
+uniform vec3 uCloth;
+uniform vec4 uSleeve;
 uniform float uAlpha;
 uniform float uShade;
 out vec4 colour;
@@ -82,23 +92,27 @@ vec3 dressed() {
   float w = 0.004;
   vec3 c = mix(uClothes[1], uClothes[0], smoothstep(-w, w, vRest.y - uCloth.y));
   c = mix(uClothes[2], c, smoothstep(-w, w, vRest.y - uCloth.x));
-  float skin = max(smoothstep(-w, w, abs(vRest.x) - uCloth.w), smoothstep(-w, w, vRest.y - uCloth.z - 0.5 * abs(vRest.x) + 0.3 * vRest.z));
-  float hem = min(min(abs(vRest.y - uCloth.y), abs(abs(vRest.x) - uCloth.w)), abs(vRest.y - uCloth.x));
+  float cuff = abs(vRest.x) > uSleeve.w ? abs(vRest.x) * uSleeve.x + vRest.y * uSleeve.y - uSleeve.z : -1.0;
+  float skin = max(smoothstep(-w, w, cuff), smoothstep(-w, w, vRest.y - uCloth.z - 0.5 * abs(vRest.x) + 0.3 * vRest.z));
+  float hem = min(min(abs(vRest.y - uCloth.y), abs(cuff)), abs(vRest.y - uCloth.x));
   return mix(c, uTints[1], skin) * mix(0.82, 1.0, smoothstep(0.0, 0.007, hem));
 }
 // White, iris with a dark rim, pupil.
 vec3 eyeball() {
   float r = length(vLook), w = max(fwidth(r), 0.01);
-  vec3 iris = uTints[7] * mix(1.25, 0.45, smoothstep(0.30, 0.47, r));
-  vec3 c = mix(iris, uTints[3], smoothstep(-w, w, r - 0.47));
-  return mix(vec3(0.004), c, smoothstep(-w, w, r - 0.2));
+  vec3 iris = uTints[7] * mix(1.25, 0.45, smoothstep(0.36, 0.56, r));
+  vec3 c = mix(iris, uTints[3], smoothstep(-w, w, r - 0.56));
+  return mix(vec3(0.004), c, smoothstep(-w, w, r - 0.25));
 }
 void main() {
   int tint = int(vTint + 0.5);
   vec3 base = tint == 0 ? dressed() : tint == 3 ? eyeball() : uTints[tint];
+  vec3 whom = mix(uOwn.rgb, uFollows.rgb, vShare);
+  base = mix(base, whom, tint == 0 ? uOwn.w : tint == 1 ? uFollows.w : 0.0);
   vec3 n = normalize(vNormal), v = normalize(uEye - vWorld);
   if (dot(n, v) < 0.0) n = normalize(n - 1.02 * dot(n, v) * v);
-  float lit = keyLight(vWorld + 0.004 * n, 0.07);
+  // The face is nearer to the head's capsule than clothes to theirs.
+  float lit = keyLight(vWorld + 0.004 * n, tint == 0 ? 0.07 : 0.16);
   float wrap = clamp((dot(n, KEY) + 0.35) / 1.35, 0.0, 1.0);
   float fill = clamp(dot(n, normalize(vec3(-0.7, 0.15, 0.5))) * 0.5 + 0.5, 0.0, 1.0);
   float sky = 0.5 + 0.5 * n.y;

@@ -1,16 +1,32 @@
-// A person of round cones on the rig's rest pose. A shape: {bone, a, b, ra, rb, k (blend), s (squeeze of x, y, z), tint}.
+// A person of round cones on the rig's bind pose. A shape: {bone, a, b, ra, rb, k (blend), s (squeeze of x, y, z), tint}.
 // Sizes are those of an adult whose eyes are 1.58 m above the floor, scaled to the rig's.
 
 const TINT = { body: 0, skin: 1, hair: 2, eye: 3, shell: 4, visor: 5, lips: 6, iris: 7, mouth: 8 };
 // Bones of the face, after the rig's joints: they ride on the head and are moved by face.js.
 const FACE_BONES = ["leftEye", "rightEye", "leftLid", "rightLid", "leftBrow", "rightBrow", "upperLip", "lowerLip", "mouth"];
 
+// Of the arms in the bind pose, radians below the horizontal.
+const LOWERED = 0.8;
+
 // Where the edges of the lids stand when the eye is open, degrees above straight ahead.
-const LIDS = { open: 25, lower: -28 };
+const LIDS = { open: 13, lower: -21 };
+
+// The pose in which the body is modelled: the rig's T-pose with arms half lowered, so that shoulders bend as little as may be either way.
+// A joint's place, and by how much its frame is turned about Z.
+function bindPose(d) {
+  const at = [], turn = [];
+  d.joints.forEach(({ name, parent, offset }, j) => {
+    const before = parent === null ? 0 : turn[parent], [s, c] = [Math.sin(before), Math.cos(before)];
+    const way = [c * offset[0] - s * offset[1], s * offset[0] + c * offset[1], offset[2]];
+    at.push(parent === null ? [...offset] : add(at[parent], way));
+    turn.push(before + (name === "leftUpperArm" ? -LOWERED : name === "rightUpperArm" ? LOWERED : 0));
+  });
+  return { at, turn };
+}
 
 function createShapes(d) {
-  const joint = (name) => d.index.get(name);
-  const at = (name) => d.rest[joint(name)];
+  const joint = (name) => d.index.get(name), bind = bindPose(d);
+  const at = (name) => bind.at[joint(name)];
   const has = (...names) => names.every((name) => joint(name) !== undefined);
   const head = has("head") ? at("head") : [0, 1.5, 0];
   const u = Math.max(0.2, head[1] + d.eyes[1]) / 1.58;
@@ -29,15 +45,16 @@ function createShapes(d) {
   if (has("hips", "leftUpperLeg", "rightUpperLeg")) {
     const [l, r, c] = [at("leftUpperLeg"), at("rightUpperLeg"), at("hips")];
     put("body", "hips", from(lerp(l, c, 0.35), 0, 0.035, -0.005), from(lerp(r, c, 0.35), 0, 0.035, -0.005), 0.106, 0.106, { ...flat(1.05), core: true });
-    put("body", "hips", from(l, 0, 0.01, -0.035), from(l, 0, 0, -0.035), 0.085, 0.085);
-    put("body", "hips", from(r, 0, 0.01, -0.035), from(r, 0, 0, -0.035), 0.085, 0.085);
+    put("body", "hips", from(l, 0, 0.03, -0.035), from(l, 0, 0.02, -0.035), 0.08, 0.08);
+    put("body", "hips", from(r, 0, 0.03, -0.035), from(r, 0, 0.02, -0.035), 0.08, 0.08);
   }
-  if (has("spine", "chest")) put("body", "spine", from(at("spine"), 0, 0, 0.012), from(at("chest"), 0, 0, 0.012), 0.122, 0.12, { ...flat(1.24), core: true });
+  if (has("hips")) put("body", "hips", from(at("hips"), 0, -0.02, -0.01), from(at("hips"), 0, -0.062, -0.008), 0.085, 0.056, { k: 0.05 * u });
+  if (has("spine", "chest")) put("body", "spine", from(at("spine"), 0, -0.02, 0.01), from(at("chest"), 0, 0, 0.012), 0.128, 0.124, { ...flat(1.26, 0.07), core: true });
   if (has("chest")) put("body", "chest", from(at("chest"), 0.035, 0.04, 0.012), from(at("chest"), -0.035, 0.04, 0.012), 0.112, 0.112, { ...flat(1.15), core: true });
   if (has("upperChest")) {
     const c = at("upperChest");
-    put("body", "upperChest", from(c, 0.07, 0.02, 0.012), from(c, -0.07, 0.02, 0.012), 0.112, 0.112, { ...flat(1.12), core: true });
-    put("body", "upperChest", from(c, 0.075, 0.075, -0.012), from(c, -0.075, 0.075, -0.012), 0.08, 0.08, flat(1.05));
+    put("body", "upperChest", from(c, 0.058, 0.02, 0.01), from(c, -0.058, 0.02, 0.01), 0.106, 0.106, { ...flat(1.12), core: true });
+    put("body", "upperChest", from(c, 0.066, 0.07, -0.012), from(c, -0.066, 0.07, -0.012), 0.074, 0.074, flat(1.05));
   }
   if (has("neck")) {
     const n = at("neck"), top = lerp(n, head, 1.25);
@@ -56,21 +73,21 @@ function createShapes(d) {
     const [, upper, lower, wrist] = names.map((n) => at(n));
     if (has(names[0], "neck")) {
       put("body", names[0], from(at("neck"), 0.03 * x, -0.005, -0.012), from(upper, -0.03 * x, 0.03, -0.006), 0.043, 0.044, { k: 0.06 * u });
-      put("body", names[0], from(upper, -0.05 * x, -0.005, 0), from(upper, -0.01 * x, 0, 0), 0.066, 0.06, { k: 0.05 * u });
+      put("body", names[0], from(upper, -0.05 * x, -0.005, 0), from(upper, -0.014 * x, 0, 0), 0.062, 0.055, { k: 0.05 * u });
     }
-    put("body", names[1], from(upper, 0.005 * x, 0, 0), lerp(upper, lower, 0.35), 0.061, 0.051, { ball: 0.97 });
-    put("body", names[1], lerp(upper, lower, 0.3), lower, 0.051, 0.041, { shade: true });
-    put("body", names[2], lower, lerp(lower, wrist, 0.3), 0.041, 0.043, { ball: 0.97 });
-    put("body", names[2], lerp(lower, wrist, 0.3), wrist, 0.043, 0.027, { shade: true });
+    put("body", names[1], upper, lerp(upper, lower, 0.35), 0.055, 0.047, { k: 0.045 * u, ball: 0.9 });
+    put("body", names[1], lerp(upper, lower, 0.3), lower, 0.047, 0.038, { shade: true });
+    put("body", names[2], lower, lerp(lower, wrist, 0.3), 0.038, 0.04, { ball: 0.93 });
+    put("body", names[2], lerp(lower, wrist, 0.3), wrist, 0.04, 0.027, { shade: true });
   }
 
   function leg(side, x) {
     const names = ["UpperLeg", "LowerLeg", "Foot", "Toes"].map((n) => side + n);
     if (!has(...names.slice(0, 3))) return;
     const [hip, knee, ankle] = names.slice(0, 3).map((n) => at(n));
-    put("body", names[0], from(hip, 0.004 * x, 0, 0), lerp(hip, knee, 0.45), 0.088, 0.077, { ball: 0.84 });
-    put("body", names[0], lerp(hip, knee, 0.4), knee, 0.078, 0.057, { shade: true });
-    put("body", names[1], knee, lerp(knee, ankle, 0.3), 0.057, 0.056, { ball: 0.97 });
+    put("body", names[0], from(hip, 0.013 * x, -0.01, 0), from(lerp(hip, knee, 0.45), 0.008 * x, 0, 0), 0.081, 0.073, { k: 0.022 * u, ball: 0.84 });
+    put("body", names[0], from(lerp(hip, knee, 0.4), 0.008 * x, 0, 0), knee, 0.074, 0.057, { k: 0.022 * u, shade: true });
+    put("body", names[1], knee, lerp(knee, ankle, 0.3), 0.057, 0.056, { ball: 0.93 });
     put("body", names[1], from(lerp(knee, ankle, 0.26), 0, 0, -0.02), from(lerp(knee, ankle, 0.4), 0, 0, -0.016), 0.045, 0.042);
     put("body", names[1], lerp(knee, ankle, 0.3), ankle, 0.056, 0.038, { shade: true });
     const toes = has(names[3]) ? at(names[3]) : from(ankle, 0, -0.06, 0.13);
@@ -85,9 +102,10 @@ function createShapes(d) {
     const name = side + "Hand";
     if (!has(name)) return;
     const w = at(name), part = name;
-    const p = (along, up, forward) => from(w, along * x, up, forward);
+    const [s, c] = [Math.sin(bind.turn[joint(name)]), Math.cos(bind.turn[joint(name)])];
+    const p = (along, up, forward) => from(w, c * along * x - s * up, s * along * x + c * up, forward);
     const tight = { k: 0.012 * u, tint: TINT.skin };
-    put(part, name, p(-0.03, 0, 0), p(0.01, 0, 0), 0.026, 0.024, tight);
+    put(part, name, p(-0.008, 0, 0), p(0.01, 0, 0), 0.0255, 0.024, tight);
     put(part, name, p(0.02, 0, 0.012), p(0.082, -0.002, 0.024), 0.017, 0.013, { ...tight, k: 0.02 * u, shade: true });
     put(part, name, p(0.02, 0, -0.012), p(0.078, -0.002, -0.022), 0.017, 0.013, { ...tight, k: 0.02 * u });
     [[0.088, 0.028, 0.066], [0.091, 0.0095, 0.074], [0.088, -0.009, 0.068], [0.08, -0.027, 0.054]].forEach(([along, forward, long]) => {
@@ -143,23 +161,30 @@ function createShapes(d) {
     pivots.mouth = face(0, -0.0662, 0);
     pivots.upperLip = pivots.lowerLip = pivots.mouth;
     feature("mouth", "mouth", TINT.mouth, 0.0034, [-0.0185, -0.0662, -0.0022], [0, -0.0668, -0.0008], [0.0185, -0.0662, -0.0022]);
-    feature("mouth", "upperLip", TINT.lips, 0.0031, [-0.0225, -0.0655, -0.0014], [-0.008, -0.0638, -0.0002], [0.008, -0.0638, -0.0002], [0.0225, -0.0655, -0.0014]);
-    feature("mouth", "lowerLip", TINT.lips, 0.0036, [-0.021, -0.0668, -0.0014], [-0.009, -0.0695, -0.0002], [0.009, -0.0695, -0.0002], [0.021, -0.0668, -0.0014]);
+    feature("mouth", "upperLip", TINT.lips, 0.0033, [-0.0225, -0.0645, -0.0016], [-0.008, -0.0638, -0.0004], [0, -0.0644, -0.0002], [0.008, -0.0638, -0.0004], [0.0225, -0.0645, -0.0016]);
+    feature("mouth", "lowerLip", TINT.lips, 0.0042, [-0.019, -0.0668, -0.0026], [-0.009, -0.0695, -0.0002], [0.009, -0.0695, -0.0002], [0.019, -0.0668, -0.0026]);
     // A cap of hair: a larger skull, cut away below the hairline and in front of the ears.
-    const cut = { tint: TINT.hair, k: 0.012 * u, s: [1.18, 1, 1] };
+    const cut = { tint: TINT.hair, k: 0.03 * u, s: [1.18, 1, 1] }, lock = { tint: TINT.hair, k: 0.022 * u };
     put("hair", "head", p(0, 0.034, -0.016), p(0, 0.03, 0.004), h + 0.006, h + 0.001, { ...cut, cut: plane([0, -0.62, 1], p(0, 0.052, 0.062)) });
     put("hair", "head", p(0, 0.0, -0.03), p(0, -0.03, -0.038), h - 0.014, h - 0.03, { ...cut, cut: plane([0, -0.25, 1], p(0, 0, -0.012)) });
+    // Volume above the forehead, swept to the side from a parting.
+    for (const [x0, x1, y1, r] of [[0.03, -0.03, 0.09, 0.017], [0.03, -0.056, 0.078, 0.016], [0.034, 0.06, 0.08, 0.015]]) {
+      put("hair", "head", p(x0, 0.094, h - 0.04), p(x1, y1, h - 0.046), r, 0.8 * r, lock);
+    }
   }
 
   const named = (name, fallback) => (has(name) ? at(name) : fallback);
-  const wrist = has("leftHand") ? Math.abs(at("leftHand")[0]) : 1e3;
+  const wrist = has("leftHand") ? at("leftHand") : [1e3, 0, 0], sleeve = [Math.cos(LOWERED), -Math.sin(LOWERED)];
   return {
     parts,
     pivots,
     all: Object.values(parts).flat(),
     unit: u,
-    // Where the clothes end, in the rest pose: [soles, waist, collar (y)] and the cuffs (|x|).
-    cloth: [named("leftFoot", [0, 0.08, 0])[1] - 0.006 * u, named("hips", [0, 0.9, 0])[1] + 0.035 * u, named("neck", [0, 1.4, 0])[1] + 0.012 * u, wrist - 0.03 * u],
+    // Where the clothes end, in the bind pose: soles, waist, collar (y).
+    cloth: [named("leftFoot", [0, 0.08, 0])[1] - 0.006 * u, named("hips", [0, 0.9, 0])[1] + 0.035 * u, named("neck", [0, 1.4, 0])[1] + 0.012 * u],
+    // Cuffs: the arm's direction (|x|, y), how far along it they are, and the |x| that only arms reach.
+    sleeve: [...sleeve, wrist[0] * sleeve[0] + wrist[1] * sleeve[1] - 0.03 * u, 0.6 * wrist[0]],
+    bind,
   };
 }
 

@@ -7,7 +7,7 @@
 // bodiless (another avatar has the body), framebuffer (default: the canvas's).
 function createWebgl(canvas, d, shapes, options = {}) {
   const gl = canvas.getContext("webgl2", { antialias: true, alpha: true, premultipliedAlpha: true, powerPreference: "low-power", ...options });
-  if (!gl || 3 * (d.joints.length + FACE_BONES.length) + 64 > gl.getParameter(gl.MAX_VERTEX_UNIFORM_VECTORS)) return null;
+  if (!gl || 4 * (d.joints.length + FACE_BONES.length) + 64 > gl.getParameter(gl.MAX_VERTEX_UNIFORM_VECTORS)) return null;
 
   const body = program(BODY_VERTEX(d.joints.length + FACE_BONES.length), BODY_FRAGMENT);
   const floor = program(FLOOR_VERTEX, FLOOR_FRAGMENT);
@@ -120,8 +120,14 @@ function createWebgl(canvas, d, shapes, options = {}) {
     gl.uniform3fv(body.place("uEye"), view.eye);
     gl.uniform3fv(body.place("uTints"), look.tints.flat());
     gl.uniform3fv(body.place("uClothes"), look.clothes.flat());
-    gl.uniform4fv(body.place("uCloth"), shapes.cloth);
+    gl.uniform3fv(body.place("uCloth"), shapes.cloth);
+    gl.uniform4fv(body.place("uSleeve"), shapes.sleeve);
     gl.uniform1f(body.place("uShade"), look.shade);
+    // Squared: the colours are those of screens, light is reckoned linearly.
+    const linear = (c, strength) => [...c.map((x) => x * x), scene.pose.dyadic ? strength : 0];
+    if (scene.pose.dyadic) gl.uniform1fv(body.place("uShares"), scene.pose.dyadic);
+    gl.uniform4fv(body.place("uOwn"), linear(dyadicColour(0), 0.85));
+    gl.uniform4fv(body.place("uFollows"), linear(dyadicColour(1), 0.45));
     if (!scene.bodiless) drawMesh(person, scene.pose.skin, 1);
     const { user, eyes } = scene.pose;
     if (!user || scene.fromUser) return;

@@ -25,7 +25,7 @@ final class SceneTest {
             FrameLayout layout = session.layout();
             float[] block = new float[layout.blockFloats()];
             session.poll(0, block, 0);
-            Pose pose = new Pose(skeleton, layout);
+            Pose pose = new Pose(skeleton, layout, stage().turns);
             pose.take(block);
             float[] at = new float[3];
             float[] carried = new float[3];
@@ -36,7 +36,7 @@ final class SceneTest {
                 }
                 // Skin at a joint goes with it, whether its parent carries it or itself.
                 for (int bone : new int[] {j, Math.max(0, skeleton.parent(j))}) {
-                    pose.carry(bone, rest(skeleton, j), carried, 0);
+                    pose.carry(bone, pose.bound(j), carried, 0);
                     for (int k = 0; k < 3; k++) {
                         near(at[k], carried[k], 1e-4, skeleton.names().get(j) + " carried by " + skeleton.names().get(bone));
                     }
@@ -45,19 +45,18 @@ final class SceneTest {
         }
     }
 
-    private static float[] rest(Skeleton skeleton, int joint) {
-        float[] at = new float[3];
-        for (int j = joint; j >= 0; j = skeleton.parent(j)) {
-            for (int k = 0; k < 3; k++) {
-                at[k] += skeleton.restOffset(j, k);
-            }
-        }
-        return at;
+    private static byte[] asset() throws IOException {
+        return Files.readAllBytes(DemoCheck.assets.resolve(StageData.ASSET));
+    }
+
+    private static StageData stage() throws IOException {
+        return StageData.read(new ByteArrayInputStream(asset()));
     }
 
     static void testStageData() throws Exception {
-        byte[] bytes = Files.readAllBytes(DemoCheck.assets.resolve(StageData.ASSET));
-        StageData data = StageData.read(new ByteArrayInputStream(bytes));
+        byte[] bytes = asset();
+        StageData data = stage();
+        isTrue(data.turns[0] == 0 && data.sleeve[3] > 0, "arms half lowered in the bind pose");
         isTrue(data.capsules.length > 4 && data.capsules.length < data.room, "room for the user's shadow");
         isTrue(data.body.count > 10_000 && data.body.count % 3 == 0, "triangles");
         for (int i = 0; i < data.body.count; i++) {

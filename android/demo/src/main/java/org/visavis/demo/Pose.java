@@ -3,28 +3,39 @@ package org.visavis.demo;
 import org.visavis.FrameLayout;
 import org.visavis.Skeleton;
 
-/** A frame on the rig with fixed bone lengths: where each joint is, and what carries the rest pose's skin there. */
+/** A frame on the rig with fixed bone lengths: where each joint is, and what carries the bind pose's skin there. */
 final class Pose {
     private final Skeleton skeleton;
     private final FrameLayout layout;
-    private final float[] rest;
+    /** Where joints are in the bind pose, and by what angle about Z their frames are turned there. */
+    private final float[] bind;
+    private final float[] turns;
     private final float[] positions;
     private final float[] rotations;
-    /** Three rows of four for each joint: a point of the rest pose to the world. */
+    /** Three rows of four for each joint: a point of the bind pose to the world. */
     final float[] skin;
     private final float[] turned = new float[3];
 
-    Pose(Skeleton skeleton, FrameLayout layout) {
+    /** {@code turns}: of each joint's frame in the bind pose, about Z, radians; the T-pose is all zeros. */
+    Pose(Skeleton skeleton, FrameLayout layout, float[] turns) {
         this.skeleton = skeleton;
         this.layout = layout;
+        this.turns = turns;
         int joints = skeleton.size();
-        rest = new float[3 * joints];
+        bind = new float[3 * joints];
         positions = new float[3 * joints];
         rotations = new float[4 * joints];
         skin = new float[12 * joints];
         for (int j = 0; j < joints; j++) {
+            int parent = Math.max(0, skeleton.parent(j));
+            double angle = j == 0 ? 0 : turns[parent];
+            float sin = (float) Math.sin(angle);
+            float cos = (float) Math.cos(angle);
+            float x = skeleton.restOffset(j, 0);
+            float y = skeleton.restOffset(j, 1);
+            float[] way = {cos * x - sin * y, sin * x + cos * y, skeleton.restOffset(j, 2)};
             for (int k = 0; k < 3; k++) {
-                rest[3 * j + k] = skeleton.restOffset(j, k) + (j == 0 ? 0 : rest[3 * skeleton.parent(j) + k]);
+                bind[3 * j + k] = way[k] + (j == 0 ? 0 : bind[3 * parent + k]);
             }
         }
     }
@@ -79,13 +90,24 @@ final class Pose {
                 skin[12 * j + 4 * row + column] = turned[row];
             }
         }
+        float sin = (float) Math.sin(turns[j]);
+        float cos = (float) Math.cos(turns[j]);
         for (int row = 0; row < 3; row++) {
             int at = 12 * j + 4 * row;
-            skin[at + 3] = positions[3 * j + row] - skin[at] * rest[3 * j] - skin[at + 1] * rest[3 * j + 1] - skin[at + 2] * rest[3 * j + 2];
+            float x = skin[at];
+            float y = skin[at + 1];
+            skin[at] = x * cos - y * sin;
+            skin[at + 1] = x * sin + y * cos;
+            skin[at + 3] = positions[3 * j + row] - skin[at] * bind[3 * j] - skin[at + 1] * bind[3 * j + 1] - skin[at + 2] * bind[3 * j + 2];
         }
     }
 
-    /** A point of the rest pose, carried by a joint, into {@code out} from {@code at} on. */
+    /** Where a joint is in the bind pose. */
+    float[] bound(int joint) {
+        return new float[] {bind[3 * joint], bind[3 * joint + 1], bind[3 * joint + 2]};
+    }
+
+    /** A point of the bind pose, carried by a joint, into {@code out} from {@code at} on. */
     void carry(int joint, float[] point, float[] out, int at) {
         for (int row = 0; row < 3; row++) {
             int m = 12 * joint + 4 * row;

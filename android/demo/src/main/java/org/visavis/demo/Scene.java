@@ -33,7 +33,7 @@ final class Scene {
             throw new IllegalStateException(StageData.ASSET + " is of a rig with " + data.joints + " joints, the model has " + skeleton.size());
         }
         this.data = data;
-        pose = new Pose(skeleton, layout);
+        pose = new Pose(skeleton, layout, data.turns);
         head = Math.max(0, skeleton.indexOf("head"));
         capsuleA = new float[4 * data.room];
         capsuleB = new float[4 * data.room];
@@ -191,7 +191,8 @@ final class Scene {
         GLES20.glUniform3fv(GLES20.glGetUniformLocation(bodyProgram, "uEye"), 1, eye, 0);
         GLES20.glUniform3fv(GLES20.glGetUniformLocation(bodyProgram, "uTints"), 9, data.tints, 0);
         GLES20.glUniform3fv(GLES20.glGetUniformLocation(bodyProgram, "uClothes"), 3, data.clothes, 0);
-        GLES20.glUniform4fv(GLES20.glGetUniformLocation(bodyProgram, "uCloth"), 1, data.cloth, 0);
+        GLES20.glUniform3fv(GLES20.glGetUniformLocation(bodyProgram, "uCloth"), 1, data.cloth, 0);
+        GLES20.glUniform4fv(GLES20.glGetUniformLocation(bodyProgram, "uSleeve"), 1, data.sleeve, 0);
         GLES20.glUniform1f(GLES20.glGetUniformLocation(bodyProgram, "uShade"), data.shade);
         GLES20.glUniform1f(GLES20.glGetUniformLocation(bodyProgram, "uAlpha"), 1);
         float yaw = (float) Math.PI;

@@ -27,7 +27,7 @@ final class StageData {
         }
     }
 
-    /** What casts the shadow of a bone: from a to b in the rest pose. */
+    /** What casts the shadow of a bone: from a to b in the bind pose. */
     static final class Capsule {
         final int bone;
         final float[] a;
@@ -45,7 +45,10 @@ final class StageData {
     final int joints;
     final float[] eyes;
     final float[] headBack;
+    /** Of each joint in the bind pose, about Z, radians. */
+    final float[] turns;
     final float[] cloth;
+    final float[] sleeve;
     final float[] floor;
     final float[] grid;
     final float dark;
@@ -64,7 +67,9 @@ final class StageData {
         joints = in.getInt();
         eyes = floats(in, 3);
         headBack = floats(in, 3);
-        cloth = floats(in, 4);
+        turns = floats(in, joints);
+        cloth = floats(in, 3);
+        sleeve = floats(in, 4);
         floor = floats(in, 3);
         grid = floats(in, 4);
         dark = in.getFloat();
