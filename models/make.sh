@@ -59,6 +59,6 @@ fi
 say 'accuracy report'
 visavis report --reference "$reference" --candidate "$f16" "$i8" "$i4" --minutes "${MINUTES:-10}" --out "$report" "${more[@]}"
 cp "$f16" "$i8" models/
-(cd models && sha256sum visavis-base.safetensors visavis-base-i8.safetensors >SHA256SUMS)
+(cd models && sha256sum visavis-*.safetensors >SHA256SUMS)
 ls -l models/*.safetensors
 say 'done'
