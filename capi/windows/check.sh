@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# The Windows library and command under Debian's Wine, minutes: capi/windows/check.sh
+# The Windows library and command under Debian's Wine, minutes: capi/windows/check.sh [full]
 #
+# full: only what takes longer, tests of the pool, of bundles and sessions inside, of bad input, and of threads that push through C.
 # Promises of sessions, inputs, files and paths; the C example; the demo's motion, in bytes those of this system. Skipped, in words, where
 # Wine or mingw cannot be had. Wine is not Windows: docs/platforms.md says what it does not show.
 set -euo pipefail
@@ -20,6 +21,14 @@ out=out/windows
 bundle=tests/goldens/tiny.safetensors
 target_std x86_64-pc-windows-gnu
 export CARGO_TARGET_X86_64_PC_WINDOWS_GNU_RUNNER=$wine
+
+tests() { cargo test --quiet --release "${std[@]}" "$@"; }
+if [ "${1:-}" = full ]; then
+  tests -p visavis --lib -- par:: bundle:: session::
+  tests -p visavis --test bad_input
+  tests -p visavis-capi --test threads
+  exit
+fi
 
 echo '-- the library, its import library and the command'
 PROFILE=release capi/windows.sh "$out"
@@ -44,7 +53,6 @@ done
 (cd "$out/here" && sha256sum motion.*)
 
 echo '-- tests: sessions on one and two threads, inputs of other threads, files, paths'
-tests() { cargo test --quiet --release "${std[@]}" "$@"; }
 tests -p visavis --test session --test inputs
 tests -p visavis-tools --test windows
 tests -p visavis-capi --test paths
