@@ -1,4 +1,8 @@
-//! A folder of files by the paths of requests: what `visavis live` gives out.
+//! A folder of files by the paths of requests, given out to browsers on this machine: `visavis live`.
+
+mod http;
+
+pub use http::serve;
 
 use std::path::{Path, PathBuf};
 use visavis::{Error, ErrorKind, Result};

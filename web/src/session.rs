@@ -113,6 +113,7 @@ pub unsafe extern "C" fn visavis_push_head(session: *mut Conversation, x: f32, y
 
 /// As [`visavis_push_head`], with the head's rotation: a quaternion of about unit length in the world,
 /// identity where the user faces +Z.
+#[allow(clippy::too_many_arguments, reason = "a module takes numbers alone")]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_push_pose(
     session: *mut Conversation,

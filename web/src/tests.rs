@@ -130,7 +130,8 @@ fn motion_is_that_of_the_file_that_webassembly_is_compared_with() {
         if bundle != engine_of {
             (engine_of, loaded) = (bundle, engine(bundle));
         }
-        writeln!(lines, "{bundle} {blocks} {options} {}", motion(loaded, options, blocks, bundle.contains("dram"))).unwrap();
+        writeln!(lines, "{bundle} {blocks} {options} {}", motion(loaded, options, blocks, bundle.contains("dram")))
+            .unwrap();
     }
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/digests.txt");
     if std::env::var("VISAVIS_DIGESTS").is_ok_and(|v| v == "write") {
