@@ -5,7 +5,7 @@ use std::fmt;
 use visavis::internals::bundle::TensorInfo;
 use visavis::internals::config::{Config, DramConfig, LstmConfig, TcnConfig};
 use visavis::internals::kernels::Scheme;
-use visavis::{BundleFile, Result};
+use visavis::{BundleFile, Engine, Result, Sampler};
 
 /// A bundle's config and tensor list; `Display` prints the summary that `visavis inspect` shows.
 #[derive(Debug, Clone, Serialize)]
@@ -85,6 +85,12 @@ impl fmt::Display for Contents {
         writeln!(f, "  rig      {} joints: {}", c.rig.joints.len(), joint_list(c))?;
         writeln!(f, "\n  licence  {}", c.licence)
     }
+}
+
+/// What makes a session's motion, for people: the sampler, or the bundle's kind where there are no
+/// samplers.
+pub fn made_with(engine: &Engine, sampler: Sampler) -> String {
+    if engine.needs_sarah().is_ok() { sampler.to_string() } else { engine.kind().to_owned() }
 }
 
 /// The predictors of the kind `dram`.

@@ -1,6 +1,7 @@
 //! Blocks beside other work that wants the cores: with one and with two threads, in turns.
 
 use super::{Talks, WARM_UP, ms};
+use crate::contents::made_with;
 use serde::Serialize;
 use std::hint::black_box;
 use std::sync::Arc;
@@ -96,7 +97,7 @@ impl UnderLoad {
             measured
         })?;
         let block_ms = times.map(|mut times| Times::of(&mut times));
-        Ok(Self { sampler: sampler.to_string(), load, every_ms: ms(every), blocks, block_ms })
+        Ok(Self { sampler: made_with(engine, sampler), load, every_ms: ms(every), blocks, block_ms })
     }
 }
 

@@ -18,6 +18,7 @@ pub use machine::{Machine, memory, read_limit};
 pub use sizes::Size;
 pub use stages::{STAGES, StageTimes};
 
+use crate::contents::made_with;
 use glam::Vec3;
 use serde::Serialize;
 use std::sync::Arc;
@@ -145,7 +146,7 @@ impl Bench {
         let (rate, limit) = (bytes as f64 / median / 1e6, read_limit(threads));
         Ok(Self {
             model: engine.config().name.clone(),
-            sampler: if engine.needs_sarah().is_ok() { sampler.to_string() } else { engine.kind().to_owned() },
+            sampler: made_with(engine, sampler),
             threads,
             sessions,
             blocks,

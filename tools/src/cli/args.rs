@@ -160,18 +160,26 @@ impl RunArgs {
         let config = engine.config();
         let defaults = &config.session;
         let gaze = self.gaze.0.map_or_else(|| "free".to_owned(), |g| g.to_string());
-        let facts = [
+        let mut facts = vec![
             ("model", config.name.clone()),
             ("about the model", config.description.clone()),
-            ("sampler", self.sampler.to_string()),
             ("gaze target", gaze),
-            ("guidance", self.weights.guidance.unwrap_or(defaults.guidance).to_string()),
-            ("gaze guidance", self.weights.gaze_guidance.unwrap_or(defaults.gaze_guidance).to_string()),
-            ("seed", self.seed.to_string()),
+        ];
+        if engine.needs_sarah().is_ok() {
+            facts.extend([
+                ("sampler", self.sampler.to_string()),
+                ("guidance", self.weights.guidance.unwrap_or(defaults.guidance).to_string()),
+                ("gaze guidance", self.weights.gaze_guidance.unwrap_or(defaults.gaze_guidance).to_string()),
+                ("seed", self.seed.to_string()),
+            ]);
+        } else {
+            facts.push(("generator", format!("{}, a step a frame", engine.kind())));
+        }
+        facts.extend([
             ("kernels", engine.kernels().level().to_string()),
             ("made by", format!("visavis {}", env!("CARGO_PKG_VERSION"))),
             ("licence of the model", config.licence.clone()),
-        ];
+        ]);
         facts.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
     }
 }

@@ -10,6 +10,7 @@ use std::time::Duration;
 use visavis::internals::kernels::{Kernels, Scheme};
 use visavis::{BundleFile, Engine, Networks, Result, Sampler};
 use visavis_tools::bench::{Bench, BenchOptions, LoadOptions, Machine, STAGES, Size, UnderLoad};
+use visavis_tools::contents::made_with;
 
 #[derive(Debug, Args)]
 pub struct BenchArgs {
@@ -106,11 +107,11 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     let (machine, kernels) = (Machine::here(), engine.kernels());
     let mut benches = Vec::new();
     let allocations: Option<fn() -> u64> = Some(allocations::count);
-    if !args.load.is_empty() {
-        return under_load(args, &engine, &machine);
-    }
     // Where there are no samplers, they are all the same.
     let samplers = if engine.needs_sarah().is_ok() { &args.sampler[..] } else { &args.sampler[..1] };
+    if !args.load.is_empty() {
+        return under_load(args, samplers, &engine, &machine);
+    }
     for &sampler in samplers {
         for &threads in &args.threads {
             for &sessions in &args.sessions {
@@ -119,7 +120,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
             }
         }
     }
-    let cold = if args.no_cold_start { Ok(Vec::new()) } else { cold_starts(args, samplers)? };
+    let cold = if args.no_cold_start { Ok(Vec::new()) } else { cold_starts(args, &engine, samplers)? };
     if args.json {
         let variants: serde_json::Map<_, _> =
             kernels.variants().iter().map(|(name, v)| ((*name).to_owned(), (*v).into())).collect();
@@ -154,9 +155,9 @@ fn milliseconds(text: &str) -> std::result::Result<f64, String> {
 }
 
 /// Prints the times beside other work.
-fn under_load(args: &BenchArgs, engine: &Arc<Engine>, machine: &Machine) -> Result<()> {
+fn under_load(args: &BenchArgs, samplers: &[Sampler], engine: &Arc<Engine>, machine: &Machine) -> Result<()> {
     let mut all = Vec::new();
-    for &sampler in &args.sampler {
+    for &sampler in samplers {
         for &load in &args.load {
             let every = Duration::from_secs_f64(args.every / 1000.0);
             all.push(UnderLoad::run(engine, LoadOptions { sampler, load, every, blocks: args.blocks })?);
@@ -183,13 +184,18 @@ fn under_load(args: &BenchArgs, engine: &Arc<Engine>, machine: &Machine) -> Resu
 
 /// The cold start with each sampler and number of threads; the inner error where no process could
 /// be started.
-fn cold_starts(args: &BenchArgs, samplers: &[Sampler]) -> Result<std::io::Result<Vec<ColdStart>>> {
+fn cold_starts(args: &BenchArgs, engine: &Engine, samplers: &[Sampler]) -> Result<std::io::Result<Vec<ColdStart>>> {
     let file = match args.size {
         Some(size) => cold_start::File::drawn(size, args.scheme)?,
         None => cold_start::File::of(files::model(args.model.as_deref())?),
     };
     let each = samplers.iter().flat_map(|sampler| args.threads.iter().map(move |threads| (*sampler, *threads)));
-    Ok(each.map(|(sampler, threads)| cold_start::measure(&file, sampler, threads, args.networks)).collect())
+    let measure = |(sampler, threads)| {
+        let mut cold = cold_start::measure(&file, sampler, threads, args.networks)?;
+        cold.sampler = made_with(engine, sampler);
+        Ok(cold)
+    };
+    Ok(each.map(measure).collect())
 }
 
 fn lines(b: &Bench) -> String {

@@ -22,7 +22,7 @@ const FRAME: &str = "first frame";
 /// Measured over [`RUNS`] processes of a sampler and number of threads.
 #[derive(Debug, Clone, Serialize)]
 pub struct ColdStart {
-    sampler: String,
+    pub(super) sampler: String,
     threads: usize,
     /// From just before the process is started to its first frame, milliseconds: median.
     first_frame_ms: f64,

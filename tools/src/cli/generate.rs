@@ -65,7 +65,13 @@ fn report(args: &RunArgs, engine: &Engine, outcome: &Outcome, summary: &Summary,
         },
     );
     let threads = if args.threads == 1 { "1 thread".to_owned() } else { format!("{} threads", args.threads) };
-    row("sampler", format!("{}, {threads}", args.sampler));
+    match &summary.dyadic {
+        Some(dyadic) => {
+            row("follows", format!("the user {:.0} %, the agent's own voice and habit the rest", 100.0 * dyadic.mean));
+            row("made by", format!("{}, a step a frame, {threads}", engine.kind()));
+        }
+        None => row("sampler", format!("{}, {threads}", args.sampler)),
+    }
     let kernels = engine.kernels();
     row("kernels", format!("{} ({})", kernels.level(), variants(&kernels.variants())));
     for note in notes(&outcome.stats) {

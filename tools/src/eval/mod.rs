@@ -50,6 +50,7 @@ pub use synthetic::synthetic;
 pub use targets::Verdict;
 pub use window::{LEAD, WINDOW, Window};
 
+use crate::contents::made_with;
 use figures::Measured;
 use parallel::each;
 use serde::Serialize;
@@ -200,7 +201,7 @@ pub fn evaluate(
         }
         let dialled: Vec<Row> =
             GAZE_TARGETS.iter().map(|&g| judge.row(sampler, Some(g), &truth)).collect::<Result<_>>()?;
-        dials.push(Dial::new(sampler, &dialled, &truth));
+        dials.push(Dial::new(made_with(engine, sampler), &dialled, &truth));
         rows.extend(dialled);
     }
 
@@ -274,7 +275,8 @@ impl Judge<'_> {
 
     /// The row of a sampler at a gaze target.
     fn row(&self, sampler: Sampler, gaze: Option<f32>, truth: &[Measured]) -> Result<Row> {
-        let name = gaze.map_or_else(|| sampler.to_string(), |g| format!("{sampler}, gaze {g}"));
+        let made = made_with(self.engine, sampler);
+        let name = gaze.map_or_else(|| made.clone(), |g| format!("{made}, gaze {g}"));
         let motion = self.measure(&name, &|i, window| {
             let seed = u64::from(self.options.seed) << 32 | i as u64;
             let options = SessionOptions { sampler, gaze, seed, ..self.options.session.clone() };
@@ -299,14 +301,14 @@ impl Judge<'_> {
 }
 
 impl Dial {
-    fn new(sampler: Sampler, rows: &[Row], truth: &[Measured]) -> Self {
+    fn new(sampler: String, rows: &[Row], truth: &[Measured]) -> Self {
         let near = |target: f32| {
             let close = |m: &&Measured| m.head_angle().is_some_and(|g| (g - f64::from(target)).abs() <= 0.1);
             truth.iter().filter(close).count()
         };
         let reached = rows.iter().map(|row| row.all.head_angle.unwrap_or(f64::NAN)).collect();
         let windows = GAZE_TARGETS.iter().map(|&t| near(t)).collect();
-        Self { sampler: sampler.to_string(), targets: GAZE_TARGETS.to_vec(), reached, windows }
+        Self { sampler, targets: GAZE_TARGETS.to_vec(), reached, windows }
     }
 }
 

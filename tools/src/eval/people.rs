@@ -5,6 +5,7 @@ use super::clip::{Clip, Segment};
 use super::motion::generate;
 use super::parallel::each;
 use super::window::LEAD;
+use crate::contents::made_with;
 use crate::metrics::{Liveliness, Tally, speech_frames};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -106,7 +107,7 @@ impl Idle {
         })?;
         let mut all = Tally::default();
         tallies.into_iter().for_each(|tally| all.merge(tally));
-        Ok(Self { name: options.sampler.to_string(), figures: all.row() })
+        Ok(Self { name: made_with(engine, options.sampler), figures: all.row() })
     }
 }
 

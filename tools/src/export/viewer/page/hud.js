@@ -18,6 +18,10 @@ function createHud(d) {
   $("mark").hidden = d.gazeTarget === null;
   if (d.gazeTarget !== null) $("mark").style.left = `${100 * clamp(d.gazeTarget, 0, 1)}%`;
   for (const who of ["agent", "user"]) $(`speaks-${who}`).hidden = !d.speech[who];
+  // A generator that tells whom the joints follow has no samplers, and its poses are on the rig.
+  $("row-follows").hidden = !d.dyadic;
+  $("row-fit").hidden = d.dyadic !== null;
+  if (d.dyadic) set("made-with", "Generator");
 
   return {
     clock,
@@ -35,7 +39,11 @@ function createHud(d) {
         flag(`speaks-${who}`, level > 0.06);
         $(`speaks-${who}`).style.setProperty("--level", clamp(levels[i], 0, 1).toFixed(2));
       }
-      set("sampler", d.samplers[d.sampler[i]] ?? "–");
+      if (d.dyadic) {
+        const joints = d.dyadic.subarray(i * d.joints.length, (i + 1) * d.joints.length);
+        set("follows", `${Math.round((100 * joints.reduce((a, b) => a + b, 0)) / (255 * joints.length))} %`);
+      }
+      set("sampler", d.dyadic ? "dram" : d.samplers[d.sampler[i]] ?? "–");
       flag("foot-left", (d.touch[i] & 1) > 0);
       flag("foot-right", (d.touch[i] & 2) > 0);
       set("fit", d.frames ? `${(1000 * d.fit[i]).toFixed(1)} mm` : "–");
