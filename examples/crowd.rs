@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let at = |t: f64| Vec3::new((1.8 * (0.5 * t).sin()) as f32, 1.65, (0.9 * (1.0 * t).sin()) as f32);
         let ahead = at(now + 0.1) - at(now);
         let rotation = Quat::from_rotation_y(ahead.x.atan2(ahead.z));
-        let speaks = (now / 3.0) as u64 % 2 == 0;
+        let speaks = ((now / 3.0) as u64).is_multiple_of(2);
         let tone = |i: usize| {
             let t = (block * sound + i) as f32 / SAMPLE_RATE as f32;
             if speaks { 0.2 * (900.0 * t).sin() * (23.0 * t).sin().max(0.0) } else { 0.0 }

@@ -284,7 +284,7 @@ impl Dram {
     /// Takes the step of frame `frame`.
     fn advance(&self, state: &mut State, frame: usize, m: &[f32], d: &[f32], delta: &[f32]) {
         let (size, joints) = (self.size(), self.bones.count());
-        let State { p, q, y, dyadic_share, root, .. } = state;
+        let State { p, q, y, shares, root, .. } = state;
         let y = &mut y[frame * size..(frame + 1) * size];
         std::mem::swap(p, q);
         for c in 0..size {
@@ -293,7 +293,7 @@ impl Dram {
         }
         orthonormalise(y);
         self.standardise(y, p);
-        per_joint(delta, &mut dyadic_share[frame * joints..(frame + 1) * joints]);
+        per_joint(delta, &mut shares[frame * joints..(frame + 1) * joints]);
         *root = root.advanced(y[0], y[1], y[2]);
         state.frame += 1;
     }

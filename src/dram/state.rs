@@ -18,7 +18,7 @@ pub struct State {
     pub(super) root: Root,
     /// The block's poses `[4, D]`, and whom its joints follow `[4, J]`.
     pub(super) y: Vec<f32>,
-    pub(super) dyadic_share: Vec<f32>,
+    pub(super) shares: Vec<f32>,
 }
 
 impl State {
@@ -33,20 +33,20 @@ impl State {
             q: vec![0.0; size],
             root: Root::default(),
             y: vec![0.0; BLOCK_FRAMES * size],
-            dyadic_share: vec![0.0; BLOCK_FRAMES * joints],
+            shares: vec![0.0; BLOCK_FRAMES * joints],
         }
     }
 
     /// Becomes `other`, of the same lengths, without allocating.
     pub(super) fn copy_from(&mut self, other: &Self) {
-        let Self { monadic, dyadic, frame, p, q, root, y, dyadic_share } = self;
+        let Self { monadic, dyadic, frame, p, q, root, y, shares } = self;
         for (to, from) in [
             (monadic, &other.monadic),
             (dyadic, &other.dyadic),
             (p, &other.p),
             (q, &other.q),
             (y, &other.y),
-            (dyadic_share, &other.dyadic_share),
+            (shares, &other.shares),
         ] {
             to.copy_from_slice(from);
         }
@@ -64,8 +64,8 @@ impl State {
     }
 
     /// How much each joint follows the user in the block's frames, `[4, J]`, 0 to 1.
-    pub fn dyadic(&self) -> &[f32] {
-        &self.dyadic_share
+    pub fn shares(&self) -> &[f32] {
+        &self.shares
     }
 
     /// The standardised pose of the last frame, `[D]`.
@@ -80,7 +80,7 @@ impl State {
 
     /// Bytes of it.
     pub fn bytes(&self) -> usize {
-        let floats = [&self.monadic, &self.dyadic, &self.p, &self.q, &self.y, &self.dyadic_share];
+        let floats = [&self.monadic, &self.dyadic, &self.p, &self.q, &self.y, &self.shares];
         size_of::<Self>() + 4 * floats.iter().map(|v| v.len()).sum::<usize>()
     }
 }

@@ -159,7 +159,7 @@ impl Block<'_> {
         if let Some(probe) = &mut self.probe {
             probe.frames(self.state.block, &self.state.frames);
             if let Some(maker) = self.state.maker.step() {
-                tell(&mut self.probe, self.state.block, "dyadic", maker.state.dyadic());
+                tell(&mut self.probe, self.state.block, "dyadic", maker.state.shares());
             }
         }
         self.state.block += 1;

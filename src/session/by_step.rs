@@ -94,7 +94,7 @@ impl ByStep {
             [y[0], y[1], y[2]]
         };
         let placed = motion.joints_block_on(pool, place, frames);
-        for (frame, dyadic) in frames.iter_mut().zip(self.state.dyadic().chunks_exact(joints)) {
+        for (frame, dyadic) in frames.iter_mut().zip(self.state.shares().chunks_exact(joints)) {
             for (to, from) in frame.dyadic.iter_mut().zip(dyadic) {
                 *to = if from.is_finite() { from.clamp(0.0, 1.0) } else { 0.0 };
             }

@@ -13,9 +13,9 @@ pub(super) enum Workspace {
     /// Of the flow model.
     Sarah {
         /// Its passes.
-        flow: flow::Work,
+        flow: Box<flow::Work>,
         /// Its decoder's.
-        vae: vae::Work,
+        vae: Box<vae::Work>,
     },
     /// Of the featherweight tier.
     Dram(dram::Work),
@@ -26,7 +26,8 @@ impl Workspace {
     pub(super) fn new(engine: &Engine, blocks: usize, latents: usize) -> Self {
         match &engine.model {
             Model::Sarah(sarah) => {
-                Self::Sarah { flow: flow::Work::new(sarah.nets().any()), vae: sarah.decoder.work(latents) }
+                let flow = Box::new(flow::Work::new(sarah.nets().any()));
+                Self::Sarah { flow, vae: Box::new(sarah.decoder.work(latents)) }
             }
             Model::Dram(dram) => Self::Dram(dram.work(blocks)),
         }
