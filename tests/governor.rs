@@ -2,10 +2,11 @@
 
 mod common;
 
-use common::{Inputs, poll_blocks, run, tiny};
+use common::{Inputs, dram, poll_blocks, run, tiny};
+use std::sync::Arc;
 use visavis::internals::session::Anchoring;
 use visavis::replay::Hold;
-use visavis::{Budget, ErrorKind, Frame, Governor, Sampler, Session, SessionOptions};
+use visavis::{Budget, Engine, ErrorKind, Frame, Governor, Sampler, Session, SessionOptions};
 
 /// Milliseconds of the last block on a device that is `slow` times slower than one that does eight
 /// evaluations in 40 ms.
@@ -14,6 +15,8 @@ fn clock(session: &Session, slow: f64) -> f64 {
     let work = match plan.hold {
         Hold::No => 8.0 + 4.0 * plan.sampler.evaluations() as f64,
         Hold::Rehearse => 4.0,
+        Hold::Fallback => 0.5,
+        Hold::RehearseFallback => 4.5,
         Hold::Yes => 0.0,
     };
     let passes = plan.catch_up.map_or(0.0, |(n, _)| 6.0 * f64::from(n));
@@ -157,4 +160,86 @@ fn without_a_reported_time_the_session_measures() {
     let frames = poll_blocks(&mut session, 200);
     assert_eq!(frames.len(), 800);
     assert!(session.decisions().count() >= 1);
+}
+
+/// A day with a fallback: motion goes on where it would be held.
+fn with_fallback(engine: &Arc<Engine>) -> Session {
+    let mut session = engine.session(options()).unwrap();
+    session.set_fallback(&dram("tcn")).unwrap();
+    session
+}
+
+#[test]
+fn too_slow_for_anything_is_left_to_the_fallback() {
+    let inputs = Inputs::circling(common::block_seconds(901), 24_000);
+    let mut session = with_fallback(&tiny());
+    let first = run(&mut session, &inputs, 1);
+    session.report_block_time(10.0).unwrap();
+    let (mut frames, late) = drive(&mut session, 900, day);
+    frames.splice(0..0, first);
+    let stats = session.stats().governor;
+    assert!(stats.fallback_blocks >= 80 && stats.held_blocks == 0, "{stats:?}");
+    assert!(late <= 6 && stats.missed as usize == late, "{late} late blocks, {stats:?}");
+    let fell_back = |f: &Frame| !f.dyadic.is_empty();
+    let count = frames.iter().filter(|f| fell_back(f)).count();
+    assert_eq!(count as u64, 4 * stats.fallback_blocks, "its frames tell whom the joints follow");
+    let last = frames.last().unwrap();
+    assert_eq!((last.held, last.sampler, fell_back(last)), (0.0, Sampler::Midpoint4, false), "and back");
+    // Held but in the cross-fades, a frame and eight after each switch.
+    let mut since = usize::MAX / 2;
+    for pair in frames.windows(2) {
+        since = if fell_back(&pair[0]) == fell_back(&pair[1]) { since + 1 } else { 0 };
+        assert_eq!(pair[1].held > 0.0, since < 9, "frame {}, {since} after a switch", pair[1].index);
+    }
+    // Where it is switched no joint is half as fast, nor changes its velocity half as much, as
+    // elsewhere at most.
+    let place = |frame: usize, j: usize| frames[frame].global[j].position;
+    let (mut switches, mut at, mut elsewhere) = (0, [0.0_f32; 2], [0.0_f32; 2]);
+    for i in 1..frames.len() - 1 {
+        let switched = fell_back(&frames[i - 1]) != fell_back(&frames[i]);
+        switches += usize::from(switched);
+        let most = if switched { &mut at } else { &mut elsewhere };
+        for j in 0..frames[i].global.len() {
+            let (before, after) = (place(i, j) - place(i - 1, j), place(i + 1, j) - place(i, j));
+            most[0] = most[0].max(before.length());
+            most[1] = most[1].max((after - before).length());
+        }
+    }
+    assert!(switches >= 2 && [0, 1].iter().all(|c| 2.0 * at[*c] < elsewhere[*c]), "{switches}, {at:?}, {elsewhere:?}");
+
+    // Replayed without a clock, and after a reset, it is the same.
+    let governor = Governor::Replay(session.decisions().collect::<Vec<_>>().into());
+    session.set_governor(governor).unwrap();
+    session.reset().unwrap();
+    assert_eq!(run(&mut session, &inputs, 901), frames);
+}
+
+/// A fallback that is late as well is given up, and tried again after rehearsals.
+#[test]
+fn a_late_fallback_gives_way_to_a_held_pose() {
+    let mut session = with_fallback(&tiny());
+    let mut frames = Vec::new();
+    for block in 0..300 {
+        frames.extend(poll_blocks(&mut session, 1));
+        let late = (60..200).contains(&block) && session.decisions().last().unwrap().plan.hold != Hold::Yes;
+        session.report_block_time(if late { 150.0 } else { 5.0 }).unwrap();
+    }
+    let stats = session.stats().governor;
+    assert!(stats.held_blocks > 80 && (3..30).contains(&stats.fallback_blocks), "{stats:?}");
+    assert!(frames.iter().flat_map(|f| &f.global).all(|t| t.position.is_finite()));
+    assert_eq!(frames.last().map(|f| f.held), Some(0.0));
+}
+
+/// A fallback that is never needed changes nothing; one that does not fit is refused.
+#[test]
+fn a_fallback_is_for_need_alone_and_must_fit() {
+    let inputs = Inputs::circling(common::block_seconds(40), 24_000);
+    let engine = tiny();
+    let plain = SessionOptions { governor: Governor::Off, ..options() };
+    let mut session = engine.session(plain.clone()).unwrap();
+    session.set_fallback(&dram("lstm")).unwrap();
+    assert_eq!(run(&mut session, &inputs, 40), run(&mut engine.session(plain).unwrap(), &inputs, 40));
+    assert_eq!(session.set_fallback(&engine).unwrap_err().kind(), ErrorKind::Argument);
+    let mut light = dram("lstm").session(SessionOptions::default()).unwrap();
+    assert_eq!(light.set_fallback(&dram("tcn")).unwrap_err().kind(), ErrorKind::Argument);
 }

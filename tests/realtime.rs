@@ -15,7 +15,7 @@ use std::time::Duration;
 use visavis::internals::kernels::Scheme;
 use visavis::internals::session::Anchoring;
 use visavis::replay::Hold;
-use visavis::{Budget, Governor, Sampler, Session, SessionOptions, Speaker};
+use visavis::{Budget, Engine, Governor, Sampler, Session, SessionOptions, Speaker};
 
 /// The system's allocator, counting what is asked of it while `WATCH` is set.
 struct Counting;
@@ -190,6 +190,7 @@ fn a_running_session_does_not_allocate() {
         let stats = session.stats().governor;
         assert!(stats.held_blocks > 0 && (!flow || stats.catch_up_passes > 0), "{stats:?}");
     }
+    falling_back_does_not_allocate(&engines, &inputs);
     // Sessions stepped together, some of which share passes.
     for (engine, threads) in engines.iter().flat_map(|e| [(e, 1), (e, 2)]) {
         let mut team = engine.team(threads).unwrap();
@@ -219,6 +220,40 @@ fn a_running_session_does_not_allocate() {
         });
         assert_eq!(calls, 0, "allocations of a team of {threads} threads");
         assert!(team.shared_blocks() > 40);
+    }
+}
+
+/// Down to the fallback, holding where that is late as well, and back, alone and in a team.
+fn falling_back_does_not_allocate(engines: &[Arc<Engine>], inputs: &Inputs) {
+    let (flow, light) = engines.split_at(4);
+    for (engine, light) in flow.iter().flat_map(|engine| light.iter().map(move |light| (engine, light))) {
+        let governor = Governor::Budget(Budget::default());
+        let mut session = engine.session(SessionOptions { governor, ..Default::default() }).unwrap();
+        session.set_fallback(light).unwrap();
+        session.push_agent_audio(&inputs.agent, inputs.rate).unwrap();
+        session.push_user_audio(&inputs.user, inputs.rate).unwrap();
+        session.poll(0.0).unwrap();
+        let mut team = engine.team(1).unwrap();
+        let calls = allocations(|| {
+            for block in 0..300 {
+                let now = session.next_due();
+                if block % 2 == 0 {
+                    team.step(&mut [(&mut session, now)]).unwrap();
+                } else {
+                    std::hint::black_box(session.poll(now).unwrap().unwrap());
+                }
+                let ms = match session.decisions().last().unwrap().plan.hold {
+                    Hold::No if (60..100).contains(&block) => 150.0,
+                    Hold::Fallback if (60..70).contains(&block) => 150.0,
+                    Hold::No => 14.0,
+                    _ => 0.5,
+                };
+                session.report_block_time(ms).unwrap();
+            }
+        });
+        assert_eq!(calls, 0, "allocations of a session with a fallback");
+        let stats = session.stats().governor;
+        assert!(stats.fallback_blocks > 0 && stats.held_blocks > 0, "{stats:?}");
     }
 }
 

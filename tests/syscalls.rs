@@ -147,6 +147,12 @@ fn blocks_of(engine: &std::sync::Arc<Engine>) {
         }
     };
     assert_eq!(confined(|| governed(&mut session)), Fate::Through);
+    if engine.kind() == "sarah" {
+        session.set_fallback(&dram("tcn")).unwrap();
+        assert_eq!(confined(|| governed(&mut session)), Fate::Through);
+        governed(&mut session);
+        assert!(session.stats().governor.fallback_blocks > 0);
+    }
 
     let mut team = engine.team(1).unwrap();
     let mut sessions = [1, 2].map(|seed| engine.session(SessionOptions { seed, ..Default::default() }).unwrap());

@@ -276,6 +276,13 @@ impl Decoder {
         self.show(None, frames);
     }
 
+    /// What comes next is another generator's: a guarded decoder comes over to it in a cross-fade.
+    pub fn cross_fade(&mut self) {
+        if self.guarded {
+            self.guard.cross_fade();
+        }
+    }
+
     /// Makes `frames` of `joints` and `steps`.
     fn show(&mut self, pool: Option<&mut Pool>, frames: &mut [Frame]) {
         let n = self.previous.len();

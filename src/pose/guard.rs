@@ -257,6 +257,11 @@ impl Guard {
         self.breathe(joints, 1.0);
     }
 
+    /// Comes over to what is decoded next as after a hold, wherever that is.
+    pub(super) fn cross_fade(&mut self) {
+        (self.state, self.paused, self.good, self.known) = (State::Hold, true, 0, false);
+    }
+
     /// Whether a joint is finite and within reach.
     fn near(&self, joint: &Transform) -> bool {
         finite(joint) && joint.position.length() <= self.reach

@@ -53,18 +53,19 @@ impl Block<'_> {
     /// Its agent in a step, if it goes by steps.
     pub(super) fn agent(&mut self) -> Option<Agent<'_>> {
         let BlockState { maker, inputs, .. } = &mut *self.state;
-        maker.step().map(|maker| maker.agent(inputs))
+        maker.step().map(|maker| maker.agent(inputs.voice_features()))
     }
 
-    /// Holds the last pose instead of computing motion, and rehearses a step where the plan says
-    /// so.
+    /// Leaves the block to the fallback, or holds the last pose, instead of computing motion;
+    /// rehearses a step where the plan says so.
     pub(super) fn hold(&mut self, tools: &mut Tools<'_>) {
-        let Self { plan, state, .. } = self;
-        self.outcome = state.inputs.skip(state.block);
+        let Self { options, plan, state, .. } = self;
+        let steps = plan.hold.falls_back() && state.fallback.is_some();
+        self.outcome = if steps { state.fall_back(options) } else { state.inputs.skip(state.block) };
         if self.outcome.is_err() {
             return;
         }
-        if plan.hold == Hold::Rehearse {
+        if plan.hold.rehearses() {
             let BlockState { maker, inputs, motion, .. } = &mut **state;
             match (maker, tools.kit()) {
                 (Maker::Latent(maker), Kit::Sarah(mut tools)) => maker.rehearse(&mut tools, inputs, plan.sampler),
@@ -72,14 +73,20 @@ impl Block<'_> {
                 _ => {}
             }
         }
-        state.motion.hold_block(&mut state.frames);
-        state.frames.iter_mut().for_each(|frame| frame.dyadic.fill(0.0));
+        if !steps {
+            state.leave_fallback();
+            state.motion.hold_block(&mut state.frames);
+            state.frames.iter_mut().for_each(|frame| frame.dyadic.fill(0.0));
+        }
         state.label(tools.engine, plan);
     }
 
     /// Makes the conditioning, for which voices have listened, and begins the latent or the steps.
     pub(super) fn begin(&mut self, engine: &Engine) {
         let Self { options, plan, state, probe, .. } = self;
+        if state.leave_fallback() {
+            state.motion.cross_fade();
+        }
         let BlockState { maker, inputs, motion, block, .. } = &mut **state;
         let root = motion.root();
         match maker {
@@ -170,6 +177,13 @@ impl Posing<'_> {
 }
 
 impl BlockState {
+    /// Lets the fallback make the block.
+    fn fall_back(&mut self, options: &SessionOptions) -> Result<()> {
+        let Self { fallback, inputs, motion, frames, block, .. } = self;
+        let Some(fallback) = fallback else { return Ok(()) };
+        fallback.make((*block, options.diagnostics.first_block, options.gaze), inputs, motion, frames)
+    }
+
     /// Makes frames of what was made.
     fn pose(&mut self, pool: Option<&mut Pool>, engine: &Engine) -> Result<()> {
         let Self { maker, motion, frames, .. } = self;

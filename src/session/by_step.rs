@@ -53,10 +53,9 @@ impl ByStep {
         (self.heard, self.seen) = (heard, seen);
     }
 
-    /// The agent in a step.
-    pub(super) fn agent<'a>(&'a mut self, inputs: &'a Inputs) -> Agent<'a> {
+    /// The agent in a step, with features of its own voice and of the user's.
+    pub(super) fn agent<'a>(&'a mut self, [voice, user]: [&'a [f32]; 2]) -> Agent<'a> {
         let Self { state, heard, seen, .. } = self;
-        let [voice, user] = inputs.voice_features();
         Agent { state, voice: heard[0].then_some(voice), user: heard[1].then_some(user), seen }
     }
 
@@ -66,7 +65,7 @@ impl ByStep {
         self.begin(root, [false; 2], [Seen::default(); BLOCK_FRAMES]);
         for frame in 0..BLOCK_FRAMES {
             let DramTools { exec, work, model } = tools;
-            model.step(exec, work, &mut [&mut *self], frame, |maker| Some(maker.agent(inputs)));
+            model.step(exec, work, &mut [&mut *self], frame, |maker| Some(maker.agent(inputs.voice_features())));
         }
         self.recover(tools.model);
     }
@@ -103,14 +102,18 @@ impl ByStep {
         self.recover(dram);
         placed?;
         if frames.iter().any(|frame| frame.held > 0.0) {
-            // What follows must go on from what was shown.
-            for (i, y) in self.shown.iter_mut().enumerate() {
-                let (joints, step) = motion.shown_joints(BLOCK_FRAMES - 2 + i);
-                dram.bones().read(joints, step, y);
-            }
-            let [before, last] = &self.shown;
-            dram.amend(&mut self.state, before, last);
+            self.go_on(dram, motion);
         }
         Ok(())
+    }
+
+    /// What follows goes on from what was shown in the last block.
+    pub(super) fn go_on(&mut self, dram: &Dram, motion: &pose::Decoder) {
+        for (i, y) in self.shown.iter_mut().enumerate() {
+            let (joints, step) = motion.shown_joints(BLOCK_FRAMES - 2 + i);
+            dram.bones().read(joints, step, y);
+        }
+        let [before, last] = &self.shown;
+        dram.amend(&mut self.state, before, last);
     }
 }

@@ -68,6 +68,25 @@ impl Hearing {
     }
 }
 
+/// An encoder of another bundle, which hears a voice while the session's own does not.
+pub(super) struct Ear {
+    encoder: AudioEncoder,
+    pub(super) features: Vec<f32>,
+    open: bool,
+}
+
+impl Ear {
+    pub(super) fn new(engine: &Engine) -> Result<Self> {
+        let features = vec![0.0; BLOCK_FRAMES * engine.config.audio.features];
+        Ok(Self { encoder: AudioEncoder::new(&engine.config.audio)?, features, open: false })
+    }
+
+    /// What it hears next starts a new signal.
+    pub(super) fn close(&mut self) {
+        self.open = false;
+    }
+}
+
 /// All inputs of a session.
 pub(super) struct Inputs {
     agent: EncodedVoice,
@@ -107,6 +126,22 @@ impl EncodedVoice {
     fn skip(&mut self, block: u64) -> Result<()> {
         self.open = false;
         self.known(block).map_or(Ok(()), |known| self.voice.take_block(known, &mut self.samples).map(drop))
+    }
+
+    /// As [`EncodedVoice::skip`], but that `ear` hears it, if there is any.
+    fn lend(&mut self, exec: &mut Exec, engine: &Engine, block: u64, ear: &mut Ear) -> Result<bool> {
+        self.open = false;
+        let Some(known) = self.known(block) else { return Ok(false) };
+        if !self.voice.take_block(known, &mut self.samples)? {
+            ear.open = false;
+            return Ok(false);
+        }
+        if !ear.open {
+            ear.encoder.reset();
+            ear.open = true;
+        }
+        ear.encoder.encode(exec, &engine.audio, &self.samples[..], &mut ear.features);
+        Ok(true)
     }
 
     /// Takes the sound that `block` may know and makes features of it, if there is any.
@@ -177,6 +212,18 @@ impl Inputs {
     pub(super) fn skip(&mut self, block: u64) -> Result<()> {
         self.agent.skip(block)?;
         self.user.skip(block)
+    }
+
+    /// Lets `ears` of `engine` listen for `block`, to the agent's voice and the user's; returns
+    /// which of them was heard.
+    pub(super) fn lend(
+        &mut self,
+        exec: &mut Exec,
+        engine: &Engine,
+        block: u64,
+        [agent, user]: &mut [Ear; 2],
+    ) -> Result<[bool; 2]> {
+        Ok([self.agent.lend(exec, engine, block, agent)?, self.user.lend(exec, engine, block, user)?])
     }
 
     /// Takes notice of what was pushed since the last time: the coming blocks know that and no

@@ -18,6 +18,7 @@
 //! | `maker` | what makes the poses, by the bundle's kind |
 //! | `by_latent` | the flow model: a latent a block, decoded |
 //! | `by_step` | the featherweight tier: a step a frame |
+//! | `fallback` | the featherweight tier in place of a held pose |
 //! | `block` | a block, stage by stage |
 //! | `pipeline` | the computation of blocks, one or several together |
 //! | `tools` | threads, working memory and weights, which blocks are computed with |
@@ -43,6 +44,7 @@ mod by_latent;
 mod by_step;
 mod controls;
 mod diagnostics;
+mod fallback;
 #[cfg(feature = "quant")]
 mod forcing;
 mod gaze;

@@ -15,7 +15,8 @@ use crate::frame::{Root, Sampler};
 ///
 /// Bundles of the kind `dram` are deterministic and make a frame a step: seed, sampler, guidance and
 /// temperature change nothing there, a gaze target is one input among others, and a governor can
-/// only hold the pose.
+/// only hold the pose. The other way round, [`super::Session::set_fallback`] lets a session of the
+/// flow model step down to such a bundle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionOptions {
     /// Seed of the noise: same seed and same inputs, same bits.

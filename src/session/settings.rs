@@ -1,12 +1,15 @@
 //! What may be set while a session runs, and the decisions that follow from it.
 
+use super::fallback::Fallback;
 use super::governor::{self, Decision, Governor, GovernorStats, Hold, Plan, Policy};
 use super::maker::Maker;
-use super::{Session, options};
+use super::{Session, argument, options};
+use crate::engine::Engine;
 #[cfg(doc)]
 use crate::error::ErrorKind;
 use crate::error::Result;
 use crate::frame::Sampler;
+use std::sync::Arc;
 
 impl Session {
     /// Sets the gaze target, -1 to 1 (0 is averted, 1 sustained eye contact), or `None` for free
@@ -95,6 +98,32 @@ impl Session {
         self.last = None;
     }
 
+    /// Gives the session an engine of the kind `dram` to step down to: where blocks of even the
+    /// last sampler come late three times in a row, a governor then has this engine make the
+    /// motion, instead of holding the pose. Both ways it is a cross-fade of eight frames. Frames
+    /// that it made have [`Frame::dyadic`](crate::Frame::dyadic), the others do not;
+    /// [`GovernorStats`] counts the blocks. Where it comes late too, the pose is held. Takes
+    /// memory; without a governor it changes nothing. A reset keeps it. For hosts in Rust; the
+    /// other languages do not have it.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] where this session's own engine is of the kind `dram`, where
+    /// `engine` is not, or where their rigs or delays differ.
+    pub fn set_fallback(&mut self, engine: &Arc<Engine>) -> Result<()> {
+        if self.engine.sarah().is_err() {
+            return Err(argument("a session of the kind `dram` has nothing to fall back from"));
+        }
+        let fallback = Fallback::new(&self.engine, engine)?;
+        let joints = engine.config.rig.len();
+        self.state.frames.iter_mut().for_each(|frame| frame.dyadic.reserve(joints));
+        if self.state.leave_fallback() {
+            self.state.motion.cross_fade();
+        }
+        self.state.fallback = Some(Box::new(fallback));
+        self.renew_policy();
+        Ok(())
+    }
+
     /// Tells how long the last block took by the caller's own clock, milliseconds, in place of what
     /// the session measured; the next decision of the governor goes by it. For callers whose
     /// deadline covers more than [`Session::poll`], and for tests with a clock of their own.
@@ -124,7 +153,8 @@ impl Session {
     pub(super) fn fresh_policy(&self) -> Option<Policy> {
         let Governor::Budget(budget) = &self.options.governor else { return None };
         Some(match &self.state.maker {
-            Maker::Latent(_) => Policy::new(budget, self.options.sampler, self.engine.has_student()),
+            Maker::Latent(_) => Policy::new(budget, self.options.sampler, self.engine.has_student())
+                .with_fallback(self.state.fallback.is_some()),
             Maker::Step(_) => Policy::single(budget, self.options.sampler),
         })
     }
@@ -145,8 +175,9 @@ impl Session {
         let plan = policy.decide(&outlook);
         let rung = policy.ladder().iter().position(|s| *s == plan.sampler).unwrap_or(0);
         let work = match plan.hold {
-            Hold::Yes => 0.0,
-            Hold::Rehearse => self.state.maker.rehearsal(plan.sampler, branches),
+            Hold::Yes | Hold::Fallback => 0.0,
+            // The fallback's time counts as the rehearsal's: it is short, and its speed another.
+            Hold::Rehearse | Hold::RehearseFallback => self.state.maker.rehearsal(plan.sampler, branches),
             Hold::No => {
                 let passes = plan.catch_up.map_or(0.0, |(passes, _)| f64::from(passes));
                 let anchor = if plan.anchor { outlook.anchor } else { 0.0 };

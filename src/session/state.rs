@@ -1,6 +1,7 @@
 //! All of a session that changes from block to block.
 
 use super::SessionOptions;
+use super::fallback::Fallback;
 use super::inputs::Inputs;
 use super::maker::Maker;
 use super::tools::{Kit, Tools};
@@ -15,6 +16,8 @@ use crate::pose;
 pub(super) struct BlockState {
     pub(super) inputs: Inputs,
     pub(super) maker: Maker,
+    /// What makes motion instead of `maker` rather than that a pose is held.
+    pub(super) fallback: Option<Box<Fallback>>,
     pub(super) motion: pose::Decoder,
     /// The rig's head.
     pub(super) head: usize,
@@ -43,6 +46,7 @@ impl BlockState {
         Ok(Self {
             inputs: Inputs::new(engine, options)?,
             maker,
+            fallback: None,
             motion,
             head: rig.index("head").unwrap_or(0),
             frames: (0..BLOCK_FRAMES).map(|_| frame()).collect(),
@@ -56,6 +60,7 @@ impl BlockState {
         self.block = options.diagnostics.first_block;
         self.inputs.reset(self.block);
         self.motion.reset(options.start);
+        self.leave_fallback();
         let Self { inputs, maker, motion, frames, block, .. } = self;
         match (maker, tools.kit()) {
             (Maker::Latent(maker), Kit::Sarah(mut tools)) => {
@@ -64,6 +69,16 @@ impl BlockState {
             (Maker::Step(maker), Kit::Dram(tools)) => maker.reset(tools.model, motion, frames),
             _ => {}
         }
+    }
+
+    /// Another than the fallback makes the next block; whether the fallback made the last.
+    pub(super) fn leave_fallback(&mut self) -> bool {
+        let left = self.fallback.as_mut().is_some_and(|fallback| fallback.leave());
+        if left {
+            // Whom joints follow is not told by others.
+            self.frames.iter_mut().for_each(|frame| frame.dyadic.clear());
+        }
+        left
     }
 
     pub(super) fn supports(&self, sampler: Sampler) -> bool {

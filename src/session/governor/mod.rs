@@ -12,7 +12,8 @@
 //! - whether there is time for a share of re-anchoring;
 //! - when blocks of the last rung came late three times in a row: to stop computing. The last
 //!   motion eases into a held, breathing pose; now and then one step is rehearsed, and motion comes
-//!   back in a cross-fade when that is fast enough.
+//!   back in a cross-fade when that is fast enough. A session with a fallback has that make the
+//!   motion meanwhile, and holds only while the fallback comes late as well.
 //!
 //! Expected time is work ([`costs`], multiply-adds from the config's sizes) times the slowest
 //! recent milliseconds per unit of work, which relax by 3 % a block. Sessions start on the last
@@ -105,6 +106,21 @@ pub enum Hold {
     Yes,
     /// Likewise, and a step is rehearsed to see how long it takes.
     Rehearse,
+    /// The session's fallback makes the motion ([`super::Session::set_fallback`]); held where it
+    /// has none.
+    Fallback,
+    /// Likewise, and a step is rehearsed.
+    RehearseFallback,
+}
+
+impl Hold {
+    pub(super) fn rehearses(self) -> bool {
+        matches!(self, Self::Rehearse | Self::RehearseFallback)
+    }
+
+    pub(super) fn falls_back(self) -> bool {
+        matches!(self, Self::Fallback | Self::RehearseFallback)
+    }
 }
 
 /// From this block on, until the next decision.
@@ -127,6 +143,8 @@ pub struct GovernorStats {
     pub up: u64,
     /// Blocks whose motion was held because even the last rung took too long.
     pub held_blocks: u64,
+    /// Blocks that the fallback made for that reason ([`super::Session::set_fallback`]).
+    pub fallback_blocks: u64,
     /// Passes spent on catching up.
     pub catch_up_passes: u64,
     /// Decisions that were dropped from the record to make room ([`super::Session::decisions`]).

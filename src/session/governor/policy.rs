@@ -57,6 +57,8 @@ pub(in crate::session) struct Policy {
     late: u32,
     held: Option<u32>,
     interval: u32,
+    /// Late blocks of the fallback in a row, where there is one.
+    fallback: Option<u32>,
     stats: GovernorStats,
 }
 
@@ -90,6 +92,7 @@ impl Policy {
             late: 0,
             held: None,
             interval: REHEARSE[0],
+            fallback: None,
             stats: GovernorStats::default(),
         }
     }
@@ -105,6 +108,12 @@ impl Policy {
         self
     }
 
+    /// The same with something to step down to before motion is held.
+    pub(in crate::session) fn with_fallback(mut self, fallback: bool) -> Self {
+        self.fallback = fallback.then_some(0);
+        self
+    }
+
     /// Samplers, best first.
     pub(in crate::session) fn ladder(&self) -> &[Sampler] {
         &self.ladder[..self.len]
@@ -117,14 +126,17 @@ impl Policy {
     /// The time that the block of the last plan took, and its work.
     pub(in crate::session) fn observe(&mut self, plan: &Plan, milliseconds: f64, work: f64) {
         self.stats.missed += u64::from(milliseconds > self.budget);
-        if plan.hold == Hold::Yes || !(milliseconds.is_finite() && milliseconds >= 0.0) {
+        if let (Hold::Fallback, Some(late)) = (plan.hold, &mut self.fallback) {
+            *late = if milliseconds > self.budget { *late + 1 } else { 0 };
+        }
+        if matches!(plan.hold, Hold::Yes | Hold::Fallback) || !(milliseconds.is_finite() && milliseconds >= 0.0) {
             return;
         }
         self.speeds[(self.seen % MEMORY as u64) as usize] = milliseconds / work;
         self.seen += 1;
         let last = self.rung == self.len - 1;
         self.late = if last && plan.hold == Hold::No && milliseconds > self.budget { self.late + 1 } else { 0 };
-        if plan.hold == Hold::Rehearse {
+        if plan.hold.rehearses() {
             // What was slow before says nothing about now.
             self.speeds.fill(milliseconds / work);
         }
@@ -217,13 +229,21 @@ impl Policy {
             }
             Some(0) => {
                 self.interval = (2 * self.interval).min(REHEARSE[1]);
+                // The fallback gets another block to be in time.
+                self.fallback = self.fallback.map(|late| late.min(LATE - 1));
                 self.interval
             }
             Some(left) => left,
         };
-        self.stats.held_blocks += 1;
+        let falls_back = self.fallback.is_some_and(|late| late < LATE);
+        *(if falls_back { &mut self.stats.fallback_blocks } else { &mut self.stats.held_blocks }) += 1;
         self.held = Some(left - 1);
-        let hold = if left == 1 { Hold::Rehearse } else { Hold::Yes };
+        let hold = match (falls_back, left) {
+            (false, 1) => Hold::Rehearse,
+            (false, _) => Hold::Yes,
+            (true, 1) => Hold::RehearseFallback,
+            (true, _) => Hold::Fallback,
+        };
         Some(Plan { sampler: self.ladder[self.len - 1], catch_up: None, anchor: false, hold })
     }
 }

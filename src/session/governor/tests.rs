@@ -65,8 +65,8 @@ impl Device {
         let rung = ladder.iter().position(|s| *s == plan.sampler).expect("a rung of the ladder");
         let (mut ms, mut units) = match plan.hold {
             Hold::No => (time(plan.sampler), work(plan.sampler)),
-            Hold::Rehearse => (5.0, 9.5),
-            Hold::Yes => (0.1, 0.0),
+            Hold::Rehearse | Hold::RehearseFallback => (5.0, 9.5),
+            Hold::Yes | Hold::Fallback => (0.1, 0.0),
         };
         if plan.hold == Hold::No {
             let extra = backlog(rung, &self.behind);
