@@ -110,9 +110,9 @@ pub struct Frame {
     /// keep up, or gave what no body can do, and in the cross-fade after that.
     pub held: f32,
     /// How much each joint follows the user rather than the agent's own voice and habit, 0 to 1,
-    /// joints as in the rig: the read-out of bundles of the kind `dram`; empty for others (of a session
-    /// with a fallback, where that did not make the frame), and
-    /// zeros while a pose is held instead of computed.
+    /// joints as in the rig: the read-out of bundles of the kind `dram`; empty for others (of a
+    /// session with a fallback, where that did not make the frame), and zeros while a pose is held
+    /// instead of computed.
     pub dyadic: Vec<f32>,
 }
 

@@ -98,16 +98,17 @@ impl Session {
         self.last = None;
     }
 
-    /// Gives the session an engine of the kind `dram` to step down to: where blocks of even the last
-    /// sampler come late three times in a row, a governor then has this engine make the motion,
-    /// instead of holding the pose. Both ways it is a cross-fade of eight frames. Frames that it made
-    /// have [`Frame::dyadic`](crate::Frame::dyadic), the others do not; [`GovernorStats`] counts the
-    /// blocks. Where it comes late too, the pose is held. Takes memory; without a governor it changes
-    /// nothing. A reset keeps it. For hosts in Rust; the other languages do not have it.
+    /// Gives the session an engine of the kind `dram` to step down to: where blocks of even the
+    /// last sampler come late three times in a row, a governor then has this engine make the
+    /// motion, instead of holding the pose. Both ways it is a cross-fade of eight frames. Frames
+    /// that it made have [`Frame::dyadic`](crate::Frame::dyadic), the others do not;
+    /// [`GovernorStats`] counts the blocks. Where it comes late too, the pose is held. Takes
+    /// memory; without a governor it changes nothing. A reset keeps it. For hosts in Rust; the
+    /// other languages do not have it.
     ///
     /// # Errors
-    /// [`ErrorKind::Argument`] where this session's own engine is of the kind `dram`, where `engine`
-    /// is not, or where their rigs or delays differ.
+    /// [`ErrorKind::Argument`] where this session's own engine is of the kind `dram`, where
+    /// `engine` is not, or where their rigs or delays differ.
     pub fn set_fallback(&mut self, engine: &Arc<Engine>) -> Result<()> {
         if self.engine.sarah().is_err() {
             return Err(argument("a session of the kind `dram` has nothing to fall back from"));

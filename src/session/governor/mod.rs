@@ -106,8 +106,8 @@ pub enum Hold {
     Yes,
     /// Likewise, and a step is rehearsed to see how long it takes.
     Rehearse,
-    /// The session's fallback makes the motion ([`super::Session::set_fallback`]); held where it has
-    /// none.
+    /// The session's fallback makes the motion ([`super::Session::set_fallback`]); held where it
+    /// has none.
     Fallback,
     /// Likewise, and a step is rehearsed.
     RehearseFallback,
