@@ -90,13 +90,13 @@ fn a_crowd_has_the_bits_of_each_alone() {
     let crowd = || -> Vec<Session> {
         let session = |i: usize| {
             let start = Root { x: i as f64, z: -1.0, yaw: 0.1 * i as f64 };
-            let options = SessionOptions { start, gaze: (i % 3 == 0).then_some(0.8), ..Default::default() };
+            let options = SessionOptions { start, gaze: (i.is_multiple_of(3)).then_some(0.8), ..Default::default() };
             let mut session = engine.session(options).expect("session");
-            if i % 2 == 0 {
+            if i.is_multiple_of(2) {
                 session.push_agent_audio(&inputs.agent[i * 10..], inputs.rate).expect("agent audio");
             }
-            let turned = (i % 4 == 0).then(|| glam::Quat::from_rotation_y(0.05 * i as f32));
-            for (time, position) in inputs.path.iter().filter(|_| i % 5 > 0) {
+            let turned = (i.is_multiple_of(4)).then(|| glam::Quat::from_rotation_y(0.05 * i as f32));
+            for (time, position) in inputs.path.iter().filter(|_| !i.is_multiple_of(5)) {
                 session.push_user_pose(*position, turned, *time).expect("head");
             }
             session
