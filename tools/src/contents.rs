@@ -19,7 +19,7 @@ pub struct Contents {
 }
 
 /// Parts of a bundle: name prefix and what it is.
-const PARTS: [(&str, &str); 9] = [
+const PARTS: [(&str, &str); 10] = [
     ("audio.", "audio encoder"),
     ("vae.encoder.", "VAE encoder"),
     ("vae.decoder.", "VAE decoder"),
@@ -27,6 +27,7 @@ const PARTS: [(&str, &str); 9] = [
     ("student.", "single-step student"),
     ("monadic.", "monadic predictor"),
     ("dyadic.", "dyadic predictor"),
+    ("mospa.", "denoiser"),
     ("stats.", "normalisation"),
     ("idle.", "idle clip"),
 ];
