@@ -31,9 +31,11 @@ class Split:
         x = np.asarray(self.motion[::3]).reshape(-1, layout.SIZE)
         x = np.concatenate([x, layout.mirror(x)])
         std, out = x.std(0), {}
+        hips = np.maximum(std[:3], 0.01)
         for part, n in ((layout.POSITIONS, 3), (layout.ROTATIONS, 6), (layout.VELOCITIES, 3)):
             joint = np.sqrt((std[part].reshape(-1, n) ** 2).mean(-1))
             std[part] = np.repeat(np.maximum(joint, {3: 0.004, 6: 0.03}[n]), n)
+        std[:3] = hips                                 # height and way spread differently
         f = np.concatenate([np.asarray(e[::3]) for e in (self.left, self.right)]).reshape(-1, self.left.shape[-1])
         out["motion_mean"], out["motion_std"], out["feature_mean"], out["feature_std"] = x.mean(0), std, f.mean(0), np.maximum(f.std(0), 0.02)
         return {k: torch.tensor(v, dtype=torch.float32) for k, v in out.items()}

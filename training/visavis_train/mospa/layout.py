@@ -3,7 +3,8 @@
     0..66     positions: hips in the world, the others relative to the hips, world axes, metres
     66..198   first and second column of the local rotation matrices, the hips' in the world
     198..264  velocities of the joints' world positions, metres a frame; frame 0: zeros
-Frame 0's root (floor projection of the hips and their heading) is at the origin facing +Z.
+Frame 0's root (floor projection of the hips and their heading) is at the origin facing +Z. A pose has the hips' height and all rotations; where the hips are on the
+floor is the sum of their velocities: their position, whose spread is metres, a network gives with centimetres of jitter.
 """
 import numpy as np
 
@@ -28,13 +29,16 @@ def from_world(positions, rotations, place=None):
 
 
 def to_world(x):
-    """Positions [T, 22, 3] and global rotation matrices of x [T, 264]: hips and rotations of x, bones of the rig."""
-    six = np.asarray(x, np.float64)[:, ROTATIONS].reshape(len(x), rig.J, 6)
+    """Positions [T, 22, 3] and global rotation matrices of x [T, 264]: the hips' way and height and the rotations of x, bones of the rig."""
+    x = np.asarray(x, np.float64)
+    six = x[:, ROTATIONS].reshape(len(x), rig.J, 6)
+    hips = np.cumsum(x[:, VELOCITIES][:, :3], axis=0)
+    hips[:, 1] = x[:, 1]
     a = six[..., :3] / np.sqrt((six[..., :3] ** 2).sum(-1, keepdims=True) + 1e-12)
     b = six[..., 3:] - (a * six[..., 3:]).sum(-1, keepdims=True) * a
     b = b / np.sqrt((b ** 2).sum(-1, keepdims=True) + 1e-12)
     rotations = rig.local_to_global(np.stack([a, b, np.cross(a, b)], -1))
-    return rig.fk_global(np.asarray(x[:, :3], np.float64), rotations), rotations
+    return rig.fk_global(hips, rotations), rotations
 
 
 def mirror(x):

@@ -7,7 +7,7 @@ from ..nets.layers import Attention, EPS, Layer, gelu
 from . import features, layout
 
 HEAD_HEIGHT, LIMIT, UNKNOWN = 1.6, 8.0, 3            # of the head at frame 0; of standardised features; genre that is not given
-SIZES = {"frames": 240, "patch": 4, "width": 192, "heads": 8, "layers": 4, "mlp": 4, "diffusion_steps": 1000, "steps": 100}
+SIZES = {"frames": 240, "patch": 8, "width": 192, "heads": 8, "layers": 4, "mlp": 4, "diffusion_steps": 1000, "steps": 100}
 
 
 def wave(n, width):

@@ -21,36 +21,41 @@ from .data import Split
 
 FEET = [rig.INDEX[n] for n in ("leftFoot", "leftToes", "rightFoot", "rightToes")]
 NO_GENRE, NO_PLACE = 0.1, 0.2
-EVERY = 4                                        # forward kinematics of every fourth pair of frames: the loss' cost
+EVERY = 8                                        # forward kinematics of every eighth pair of frames: the loss' cost
 
 
 def change(x):
     return x[:, 1:] - x[:, :-1]
 
 
+def way(x):
+    """The hips' way [B, T, 3] of motion [B, T, 264] in metres, as poses have it (`layout.to_world`)."""
+    v = x[..., layout.VELOCITIES]
+    return torch.stack([v[..., 0].cumsum(1), x[..., 1], v[..., 2].cumsum(1)], -1)
+
+
 def joints(x):
-    """World positions [B, T, 22, 3] of motion [B, T, 264] in metres, by forward kinematics."""
-    six = pose.orthonormal(x[..., layout.ROTATIONS].unflatten(-1, (rig.J, 6)))
-    return pose.kinematics(six)[0] + x[..., None, :3]
+    """Positions relative to the hips [B, T, 22, 3] of motion [B, T, 264] in metres, by forward kinematics."""
+    return pose.kinematics(pose.orthonormal(x[..., layout.ROTATIONS].unflatten(-1, (rig.J, 6))))[0]
 
 
 def losses(net, made, clean):
     """The paper's terms of standardised motions [B, T, D]; the sum and its parts."""
     error, moved = made - clean, change(made) - change(clean)
     speed = 8.0                                  # a frame's change is so much smaller than the spread of poses
-    plain = error.square().mean() + (speed * moved).square().mean()
-    way, turn = (error[..., :3].square().mean() + (speed * moved[..., :3]).square().mean(), error[..., layout.ROTATIONS].square().mean())
+    plain, turn = error.square().mean() + (speed * moved).square().mean(), error[..., layout.ROTATIONS].square().mean()
     first = torch.arange(int(torch.randint(EVERY, (1,))), made.shape[1] - 1, EVERY)
     at = torch.stack([first, first + 1], 1).flatten()
-    ours, theirs = (joints(net.unstandardise(v[:, at])).unflatten(1, (-1, 2)) for v in (made, clean))
-    off = ours - theirs
-    steps = (off[:, :, 1] - off[:, :, 0]) * rig.FPS
-    places, feet = 4 * off.square().sum(-1).mean() + 0.3 * steps.square().sum(-1).mean(), steps[:, :, FEET].square().sum(-1).mean()
-    return plain + way + 0.5 * turn + places + feet, {"plain": plain, "way": way, "places": places, "feet": feet}
+    made, clean = net.unstandardise(made), net.unstandardise(clean)
+    gone = way(made) - way(clean)
+    off = joints(made[:, at]) - joints(clean[:, at])
+    steps = change((off + gone[:, at, None]).unflatten(1, (-1, 2)).transpose(1, 2))[:, 0] * rig.FPS
+    places, path, feet = off.square().sum(-1).mean(), gone.square().sum(-1).mean(), steps[:, :, FEET].square().sum(-1).mean()
+    return plain + turn + 10 * places + path + 0.05 * steps.square().sum(-1).mean() + 0.05 * feet, {"plain": plain, "places": places, "path": path, "feet": feet}
 
 
 def build(args, data):
-    net = nets.Mospa(**nets.SIZES | {k: getattr(args, k) for k in ("width", "heads", "layers")})
+    net = nets.Mospa(**nets.SIZES | {k: getattr(args, k) for k in ("patch", "width", "heads", "layers")})
     for name, value in data.statistics().items():
         getattr(net, name).copy_(value)
     return net
@@ -68,7 +73,7 @@ def train(args):
     torch.manual_seed(args.seed)
     data, held = Split(args.corpus, "train"), Split(args.corpus, "val")
     net = build(args, data)
-    sizes = nets.SIZES | {k: getattr(args, k) for k in ("width", "heads", "layers")}
+    sizes = nets.SIZES | {k: getattr(args, k) for k in ("patch", "width", "heads", "layers")}
     loop = Loop(team, net, args, warmup=60, average=0.995, sizes=sizes, genre=not args.no_genre)
     check = list(range(0, len(held), 2))
     x = torch.from_numpy(held.poses(check))
@@ -107,7 +112,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--corpus", required=True, help="folder of visavis_train.mospa.corpus")
     parser.add_argument("--out", required=True, help="checkpoint")
-    for name in ("width", "heads", "layers"):
+    for name in ("patch", "width", "heads", "layers"):
         parser.add_argument("--" + name, type=int, default=nets.SIZES[name])
     parser.add_argument("--no-genre", action="store_true", help="the ablation without the sensitivity")
     common.arguments(parser, steps=3000, lr=1e-3, batch=32)
