@@ -157,7 +157,9 @@ impl Reactor {
     /// [`ErrorKind::State`] where numbers are none.
     pub fn poses(&self, motion: &[f32]) -> Result<Vec<Frame>> {
         let width = motion_size(self.config.rig.len());
-        motion.chunks_exact(width).enumerate().map(|(i, x)| pose::frame(&self.config.rig, i, x)).collect()
+        let mut way = [0.0; 2];
+        let frame = |(i, x)| pose::frame(&self.config.rig, i, x, &mut way);
+        motion.chunks_exact(width).enumerate().map(frame).collect()
     }
 
     fn check(&self, heard: &Heard<'_>, noise: &[f32], steps: usize) -> Result<()> {

@@ -1,8 +1,10 @@
 //! Motion vectors x `[12 J]` to frames.
 //!
 //! Hips in the world, the other joints' positions relative to them (`3 J`); first and second
-//! column of each joint's local rotation (`6 J`), the hips' in the world; velocities (`3 J`).
-//! Frames take the hips and the rotations; the rest helps the network alone.
+//! column of each joint's local rotation (`6 J`), the hips' in the world; velocities of the joints'
+//! world positions, metres a frame (`3 J`). Frames take the rotations and the height of the hips;
+//! the hips' way over the floor is the sum of their velocities, as positions jitter by centimetres.
+//! The rest helps the network alone.
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{FPS, Frame, Root};
@@ -14,14 +16,15 @@ pub const fn motion_size(joints: usize) -> usize {
     12 * joints
 }
 
-/// Frame `index` of vector `x` on `rig`.
+/// Frame `index` of vector `x` on `rig`; `way`, the hips' place on the floor (x, z) in the frame
+/// before, goes on by their velocity.
 ///
 /// # Errors
 /// [`ErrorKind::State`] where the numbers are none.
 ///
 /// # Panics
 /// When `x` is not that of the rig.
-pub(super) fn frame(rig: &Rig, index: usize, x: &[f32]) -> Result<Frame> {
+pub(super) fn frame(rig: &Rig, index: usize, x: &[f32], way: &mut [f64; 2]) -> Result<Frame> {
     let n = rig.len();
     assert_eq!(x.len(), motion_size(n), "a motion vector of this rig");
     if !x.iter().all(|v| v.is_finite()) {
@@ -31,14 +34,16 @@ pub(super) fn frame(rig: &Rig, index: usize, x: &[f32]) -> Result<Frame> {
     let mut out = Frame::empty(n);
     out.index = index as u64;
     out.time = index as f64 / f64::from(FPS);
-    out.hips = Vec3::from_slice(&x[..3]);
+    way[0] += f64::from(x[9 * n]);
+    way[1] += f64::from(x[9 * n + 2]);
+    out.hips = Vec3::new(way[0] as f32, x[1], way[1] as f32);
     for (local, six) in out.local.iter_mut().zip(x[3 * n..9 * n].as_chunks::<6>().0) {
         *local = rotation(six);
     }
     rig.fk(out.hips, &out.local, &mut out.global);
     let ahead = out.local[0] * Vec3::Z;
     let yaw = libm::atan2(f64::from(ahead.x), f64::from(ahead.z));
-    out.root = Root { x: f64::from(out.hips.x), z: f64::from(out.hips.z), yaw };
+    out.root = Root { x: way[0], z: way[1], yaw };
     Ok(out)
 }
 
@@ -67,16 +72,19 @@ mod tests {
         assert!((rotation(&[0.0; 6]).length() - 1.0).abs() < 1e-6);
         let rig = Rig::humanoid();
         let mut x = vec![0.0; motion_size(rig.len())];
-        x[..3].copy_from_slice(&[1.0, 0.9, -2.0]);
+        x[..3].copy_from_slice(&[7.0, 0.9, 7.0]);
+        x[9 * rig.len()..][..3].copy_from_slice(&[0.5, 7.0, -0.25]);
         for six in x[3 * rig.len()..9 * rig.len()].chunks_exact_mut(6) {
             six.copy_from_slice(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
         }
         // The hips face +X.
         x[3 * rig.len()..][..6].copy_from_slice(&[0.0, 0.0, -1.0, 0.0, 1.0, 0.0]);
-        let frame = super::frame(&rig, 30, &x).unwrap();
-        assert_eq!((frame.time, frame.root.x, frame.root.z), (1.0, 1.0, -2.0));
+        let mut way = [0.5, -1.75];
+        let frame = super::frame(&rig, 30, &x, &mut way).unwrap();
+        assert_eq!((frame.time, frame.root.x, frame.root.z, frame.hips.y), (1.0, 1.0, -2.0, 0.9));
+        assert_eq!(way, [1.0, -2.0]);
         assert!((frame.root.yaw - std::f64::consts::FRAC_PI_2).abs() < 1e-6);
         x[40] = f32::NAN;
-        assert_eq!(super::frame(&rig, 0, &x).unwrap_err().kind(), ErrorKind::State);
+        assert_eq!(super::frame(&rig, 0, &x, &mut way).unwrap_err().kind(), ErrorKind::State);
     }
 }

@@ -1,7 +1,7 @@
 use super::*;
 use safetensors::SafeTensors;
 
-/// Largest differences of columns and what they are.
+/// Columns and what they are.
 const PARTS: [(&str, std::ops::Range<usize>); 8] = [
     ("MFCC", 0..20),
     ("deltas", 20..40),
@@ -29,11 +29,11 @@ fn features_are_those_of_librosa() {
     let found = ear(&sound).unwrap();
     assert_eq!(found.len(), wanted.len());
     assert!(wanted.iter().skip(129).step_by(SIZE).sum::<f32>() >= 3.0, "the golden has beats");
+    assert!(found.iter().chain(&wanted).all(|v| v.is_finite()));
     for (name, columns) in PARTS {
         let rows = found.chunks_exact(SIZE).zip(wanted.chunks_exact(SIZE));
         let errors = rows.flat_map(|(a, b)| a[columns.clone()].iter().zip(&b[columns.clone()]).map(|(a, b)| (a - b).abs()));
         let error = errors.fold(0.0, f32::max);
-        println!("{name}: {error:e}");
         assert!(error < 1e-4, "{name}: {error}");
     }
 }
@@ -59,7 +59,9 @@ fn clicks_of_two_a_second_are_beats_of_two_a_second() {
     let found = ear(&y).unwrap();
     let beats: Vec<usize> = (0..240).filter(|t| found[t * SIZE + 129] == 1.0).collect();
     assert!(beats.len() >= 12, "{beats:?}");
-    assert!(beats.windows(2).all(|pair| pair[1] - pair[0] == 15), "{beats:?}");
+    // The last one has only half of its surroundings.
+    let inner = &beats[..beats.len() - 1];
+    assert!(inner.windows(2).all(|pair| pair[1] - pair[0] == 15), "{beats:?}");
 }
 
 #[test]
