@@ -173,8 +173,7 @@ impl Engine {
 
     fn build(config: Config, t: &Tensors<'_>, kernels: Kernels, networks: Networks) -> Result<Self> {
         if config.kind == Kind::Mospa {
-            let message =
-                "a bundle of the kind `mospa` reacts to whole clips of sound and has no sessions; run it with `visavis react`";
+            let message = "a bundle of the kind `mospa` reacts to whole clips of sound and has no sessions; run it with `visavis react`";
             return Err(Error::new(ErrorKind::Argument, message));
         }
         let audio_source = AudioSource::load(t, &config.audio)?;

@@ -60,7 +60,10 @@ fn mospa(m: &MospaConfig) -> Result<()> {
     within("mospa.diffusion_steps", m.diffusion_steps, 1, 1000)?;
     within("mospa.steps", m.steps, 1, m.diffusion_steps)?;
     if !m.frames.is_multiple_of(m.patch) {
-        return Err(invalid(format!("mospa.frames is {}: it must be a multiple of mospa.patch, {}", m.frames, m.patch)));
+        return Err(invalid(format!(
+            "mospa.frames is {}: it must be a multiple of mospa.patch, {}",
+            m.frames, m.patch
+        )));
     }
     let tokens = 3 + 2 * m.frames / m.patch;
     let bytes = [4, tokens, m.width, 7 + m.mlp].iter().map(|n| *n as u128).product::<u128>();

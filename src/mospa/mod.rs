@@ -79,7 +79,8 @@ impl Reactor {
     pub fn from_tensors(config: Config, t: &Tensors<'_>, kernels: Kernels) -> Result<Self> {
         let (Kind::Mospa, Some(sizes)) = (config.kind, config.mospa) else {
             let kind = config.kind.name();
-            let message = format!("a bundle of the kind `{kind}` does not react to clips; this needs one of the kind `mospa`");
+            let message =
+                format!("a bundle of the kind `{kind}` does not react to clips; this needs one of the kind `mospa`");
             return Err(Error::new(ErrorKind::Argument, message));
         };
         let network = Network::load(t, kernels, &sizes, config.rig.len())?;
@@ -168,9 +169,11 @@ impl Reactor {
             return argument(format!("{steps} diffusion steps: this bundle takes 1 to {}", self.sizes.diffusion_steps));
         }
         let (frames, size) = (self.sizes.frames, self.network.size());
-        for (what, values, wanted) in
-            [("left features", heard.left, frames * SIZE), ("right features", heard.right, frames * SIZE), ("noise", noise, size)]
-        {
+        for (what, values, wanted) in [
+            ("left features", heard.left, frames * SIZE),
+            ("right features", heard.right, frames * SIZE),
+            ("noise", noise, size),
+        ] {
             if values.len() != wanted {
                 return argument(format!("{} numbers of {what}: a clip of {frames} frames has {wanted}", values.len()));
             }

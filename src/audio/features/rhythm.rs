@@ -31,9 +31,7 @@ pub(super) fn tempogram(envelope: &[f64], lags: usize) -> Vec<f64> {
 /// preference for 120 a minute.
 fn period(envelope: &[f64]) -> usize {
     let rows = tempogram(envelope, TEMPO_LAGS);
-    let mean = |lag: usize| {
-        rows.iter().skip(lag).step_by(TEMPO_LAGS).sum::<f64>() / envelope.len() as f64
-    };
+    let mean = |lag: usize| rows.iter().skip(lag).step_by(TEMPO_LAGS).sum::<f64>() / envelope.len() as f64;
     let strength = |lag: usize| {
         let octaves = libm::log2(60.0 * f64::from(FPS) / lag as f64 / 120.0);
         libm::log1p(1e6 * mean(lag)) - 0.5 * octaves * octaves

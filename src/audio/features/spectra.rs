@@ -112,9 +112,7 @@ pub(super) fn slopes(x: &[f64]) -> Vec<f64> {
 /// Mean rise of the bands `[T]` since the frame before, two frames late.
 pub(super) fn onsets(db: &[f64]) -> Vec<f64> {
     let rows: Vec<_> = db.chunks_exact(MELS).collect();
-    let rise = |pair: &[&[f64]]| {
-        pair[1].iter().zip(pair[0]).map(|(b, a)| (b - a).max(0.0)).sum::<f64>() / MELS as f64
-    };
+    let rise = |pair: &[&[f64]]| pair[1].iter().zip(pair[0]).map(|(b, a)| (b - a).max(0.0)).sum::<f64>() / MELS as f64;
     [0.0; 2].into_iter().chain(rows.windows(2).map(rise)).take(rows.len()).collect()
 }
 

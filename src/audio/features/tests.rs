@@ -32,7 +32,8 @@ fn features_are_those_of_librosa() {
     assert!(found.iter().chain(&wanted).all(|v| v.is_finite()));
     for (name, columns) in PARTS {
         let rows = found.chunks_exact(SIZE).zip(wanted.chunks_exact(SIZE));
-        let errors = rows.flat_map(|(a, b)| a[columns.clone()].iter().zip(&b[columns.clone()]).map(|(a, b)| (a - b).abs()));
+        let errors =
+            rows.flat_map(|(a, b)| a[columns.clone()].iter().zip(&b[columns.clone()]).map(|(a, b)| (a - b).abs()));
         let error = errors.fold(0.0, f32::max);
         assert!(error < 1e-4, "{name}: {error}");
     }

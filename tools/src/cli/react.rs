@@ -64,7 +64,9 @@ pub fn run(args: &ReactArgs) -> Result<()> {
     ];
     let names: Vec<_> = sounds.iter().map(|sound| sound.name.as_str()).collect();
     let facts = facts.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
-    let meta = Meta { title: "Visavis reacts".to_owned(), subtitle: names.join(", "), facts, live: out.live_page() };
+    let method = Some(format!("{} steps", outcome.steps));
+    let meta =
+        Meta { title: "Visavis reacts".to_owned(), subtitle: names.join(", "), facts, method, live: out.live_page() };
     let paths = out.write(&outcome.recording, &meta, &summary)?;
     print(&report(&outcome, &sounds, &paths))
 }

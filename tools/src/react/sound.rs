@@ -37,7 +37,10 @@ impl Sound {
 /// File, place and start.
 fn parse(text: &str) -> Result<(&str, DVec3, f64)> {
     let bad = |why: &str| {
-        Error::new(ErrorKind::Argument, format!("the sound `{text}` {why}; give FILE.wav@x,y,z or FILE.wav@x,y,z:t=SECONDS"))
+        Error::new(
+            ErrorKind::Argument,
+            format!("the sound `{text}` {why}; give FILE.wav@x,y,z or FILE.wav@x,y,z:t=SECONDS"),
+        )
     };
     let (file, rest) = text.rsplit_once('@').ok_or_else(|| bad("has no place"))?;
     if file.is_empty() {
@@ -51,7 +54,8 @@ fn parse(text: &str) -> Result<(&str, DVec3, f64)> {
         return Err(bad("begins before the clip, or never"));
     }
     let numbers: Result<Vec<f64>, _> = place.split(',').map(|n| n.trim().parse::<f64>()).collect();
-    let place: [f64; 3] = (numbers.ok()).and_then(|n| n.try_into().ok()).ok_or_else(|| bad("is not at three numbers"))?;
+    let place: [f64; 3] =
+        (numbers.ok()).and_then(|n| n.try_into().ok()).ok_or_else(|| bad("is not at three numbers"))?;
     check_place(place)?;
     Ok((file, DVec3::from_array(place), start))
 }
@@ -66,9 +70,18 @@ mod tests {
         assert_eq!((file, place, start), ("a@b/bang.wav", DVec3::new(2.0, 0.5, -3.0), 6.5));
         assert_eq!(parse("bang.wav@1,1,1").unwrap().2, 0.0);
         for bad in [
-            "bang.wav", "@1,1,1", "bang.wav@1,1", "bang.wav@1,1,1,1", "bang.wav@NaN,1,1", "bang.wav@1,inf,1",
-            "bang.wav@a,1,1", "bang.wav@1,1,1:t=", "bang.wav@1,1,1:t=-1", "bang.wav@1,1,1:t=NaN",
-            "bang.wav@0,1.6,0.05", "bang.wav@200,1,1",
+            "bang.wav",
+            "@1,1,1",
+            "bang.wav@1,1",
+            "bang.wav@1,1,1,1",
+            "bang.wav@NaN,1,1",
+            "bang.wav@1,inf,1",
+            "bang.wav@a,1,1",
+            "bang.wav@1,1,1:t=",
+            "bang.wav@1,1,1:t=-1",
+            "bang.wav@1,1,1:t=NaN",
+            "bang.wav@0,1.6,0.05",
+            "bang.wav@200,1,1",
         ] {
             assert_eq!(parse(bad).unwrap_err().kind(), ErrorKind::Argument, "{bad}");
         }

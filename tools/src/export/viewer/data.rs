@@ -44,7 +44,7 @@ pub fn json(recording: &Recording, meta: &Meta) -> String {
         "eyes": rig.eyes,
         "headBack": rig.head_back,
         "gazeTarget": recording.gaze_target,
-        "samplers": samplers.iter().map(|s| sampler_name(*s)).collect::<Vec<_>>(),
+        "samplers": samplers.iter().map(|s| meta.method.clone().unwrap_or_else(|| sampler_name(*s))).collect::<Vec<_>>(),
         "step": STEP,
         "root": floats(frames.iter().flat_map(|f| [f.root.x as f32, f.root.z as f32, f.root.yaw as f32])),
         "hips": floats(frames.iter().flat_map(|f| f.hips.to_array())),
@@ -274,6 +274,7 @@ mod tests {
             title: "</script><script>alert(1)</script><!-- \u{2028} \"quoted\" 안녕".into(),
             subtitle: "{{script}} <b>".into(),
             facts: vec![("a<b".into(), "\\".into())],
+            method: Some("<i>".into()),
             live: None,
         };
         let text = json(&recording(), &meta);
@@ -281,6 +282,7 @@ mod tests {
         let v: Value = serde_json::from_str(&text).unwrap();
         assert_eq!(v["title"], meta.title);
         assert_eq!(v["subtitle"], meta.subtitle);
+        assert_eq!(v["samplers"][0], "<i>");
         assert_eq!(v["facts"][0], json!(["a<b", "\\"]));
         let page = super::super::render(&recording(), &meta);
         assert_eq!(page.to_ascii_lowercase().matches("</script>").count(), 2);
