@@ -5,8 +5,10 @@
 //! `training/visavis_train/export.py`.
 
 mod dram;
+mod mospa;
 
 pub use dram::{DramBundle, DramConfig, LstmConfig, TcnConfig};
+pub use mospa::{MospaBundle, MospaConfig};
 
 use crate::rig::Rig;
 use crate::scheme::Scheme;
@@ -25,6 +27,8 @@ pub enum Kind {
     Sarah,
     /// Dyadic residual attention, the featherweight tier.
     Dram,
+    /// Reactions to whole clips of sound (MOSPA's model); no sessions.
+    Mospa,
 }
 
 impl Kind {
@@ -33,6 +37,7 @@ impl Kind {
         match self {
             Self::Sarah => "sarah",
             Self::Dram => "dram",
+            Self::Mospa => "mospa",
         }
     }
 
@@ -62,15 +67,16 @@ pub struct Config {
     pub agent_delay_blocks: u32,
     /// The skeleton.
     pub rig: Rig,
-    /// Pose representation; none (radius 0) for `dram`.
+    /// Pose representation; none (radius 0) for other kinds than `sarah`.
     #[serde(skip_serializing_if = "PoseConfig::is_empty")]
     pub pose: PoseConfig,
-    /// Audio encoder.
+    /// Audio encoder; none (no layers) for `mospa`.
+    #[serde(skip_serializing_if = "AudioConfig::is_empty")]
     pub audio: AudioConfig,
-    /// Variational autoencoder of motion; none (sizes 0) for `dram`.
+    /// Variational autoencoder of motion; none (sizes 0) for other kinds than `sarah`.
     #[serde(skip_serializing_if = "VaeConfig::is_empty")]
     pub vae: VaeConfig,
-    /// Flow transformer; none (sizes 0) for `dram`.
+    /// Flow transformer; none (sizes 0) for other kinds than `sarah`.
     #[serde(skip_serializing_if = "FlowConfig::is_empty")]
     pub flow: FlowConfig,
     /// Single-step student, when the bundle holds one.
@@ -78,6 +84,9 @@ pub struct Config {
     /// Predictors of the kind `dram`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dram: Option<DramConfig>,
+    /// Denoiser of the kind `mospa`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mospa: Option<MospaConfig>,
     /// Defaults for sessions.
     pub session: SessionConfig,
     /// What the gaze channel does to this model's gaze, as `visavis calibrate` measured it; none:
@@ -112,12 +121,18 @@ impl PoseConfig {
 }
 
 /// Audio encoder: a stack of causal convolutions over 24 kHz mono, one feature vector per frame.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct AudioConfig {
     /// Convolutions, first to last; the product of their strides is 800.
     pub layers: Vec<ConvConfig>,
     /// Width of the feature vector.
     pub features: usize,
+}
+
+impl AudioConfig {
+    fn is_empty(&self) -> bool {
+        self.layers.is_empty()
+    }
 }
 
 /// One causal convolution: `kernel - stride` zeros (or carried samples) on the left, then GELU.

@@ -8,7 +8,7 @@ pub(crate) use model::{Model, Sarah};
 
 use crate::audio::{AudioEncoder, AudioWeights};
 use crate::bundle::{AudioSource, BundleFile, LoadMode, Tensors};
-use crate::config::Config;
+use crate::config::{Config, Kind};
 use crate::dram::Dram;
 use crate::error::{Error, ErrorKind, Result};
 use crate::flow::ConditionLayout;
@@ -172,6 +172,10 @@ impl Engine {
     }
 
     fn build(config: Config, t: &Tensors<'_>, kernels: Kernels, networks: Networks) -> Result<Self> {
+        if config.kind == Kind::Mospa {
+            let message = "a bundle of the kind `mospa` reacts to whole clips of sound and has no sessions; run it with `visavis react`";
+            return Err(Error::new(ErrorKind::Argument, message));
+        }
         let audio_source = AudioSource::load(t, &config.audio)?;
         let mut exec = exec(&config, kernels, 1)?;
         let model = match &config.dram {

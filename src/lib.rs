@@ -29,6 +29,8 @@ mod frame;
 #[allow(unsafe_code, reason = "SIMD loads, stores and inline assembly")]
 #[cfg_attr(feature = "kernel-tests", allow(unused, reason = "tests without their harness"))]
 mod kernels;
+#[cfg(feature = "internals")]
+mod mospa;
 mod nn;
 mod normaliser;
 #[allow(unsafe_code, reason = "the fork-join pool hands slices to its worker")]
@@ -87,7 +89,7 @@ pub mod internals {
         ($($room:ident)*) => { $(pub mod $room { pub use crate::$room::*; })* };
     }
 
-    rooms!(audio bounded bundle config dram engine flow frame kernels nn normaliser par pose session user vae);
+    rooms!(audio bounded bundle config dram engine flow frame kernels mospa nn normaliser par pose session user vae);
     #[cfg(feature = "quant")]
     rooms!(quant);
 }

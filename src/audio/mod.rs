@@ -5,8 +5,15 @@
 //! any size,     resampler; a ring of    3200 samples per block,  on our kernels,  D_a per
 //! rate, thread  a minute at 24 kHz      on the session's time    or TractEncoder  frame
 //! ```
+//!
+//! And, for whole clips at a desk (`internals` alone): what two ears hear of a sound somewhere
+//! (`ears`), and `features` of what an ear hears.
 
+#[cfg(feature = "internals")]
+pub mod ears;
 mod encoder;
+#[cfg(feature = "internals")]
+pub mod features;
 mod feed;
 mod input;
 mod line;

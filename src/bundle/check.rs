@@ -7,7 +7,7 @@
 
 use super::invalid;
 use crate::audio::check_audio_config;
-use crate::config::{Config, DramConfig, GazeConfig, GazeCurve, Kind, LstmConfig, TcnConfig};
+use crate::config::{Config, DramConfig, GazeConfig, GazeCurve, Kind, LstmConfig, MospaConfig, TcnConfig};
 use crate::error::Result;
 use crate::frame::feature_count;
 use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES};
@@ -18,16 +18,12 @@ const MAX_SESSION: u128 = 1 << 30;
 
 /// Checks every number of `config` against its range.
 pub(super) fn config(c: &Config) -> Result<()> {
-    within("user_delay_blocks", c.user_delay_blocks as usize, 1, 4)?;
-    within("agent_delay_blocks", c.agent_delay_blocks as usize, 0, 4)?;
     c.rig.check()?;
-    within("audio.layers", c.audio.layers.len(), 1, 32)?;
-    check_audio_config(&c.audio)?;
-    real("session.bridge", c.session.bridge, 0.0, 30.0)?;
-    match (c.kind, &c.dram) {
-        (Kind::Sarah, None) => sarah(c)?,
-        (Kind::Dram, Some(dram)) => self::dram(c, dram)?,
-        (Kind::Sarah, Some(_)) | (Kind::Dram, None) => {
+    match (c.kind, &c.dram, &c.mospa) {
+        (Kind::Sarah, None, None) => conversation(c).and_then(|()| sarah(c))?,
+        (Kind::Dram, Some(dram), None) => conversation(c).and_then(|()| self::dram(c, dram))?,
+        (Kind::Mospa, None, Some(mospa)) => return self::mospa(mospa),
+        _ => {
             let kind = c.kind.name();
             return Err(invalid(format!(
                 "the config is of kind `{kind}`, and its networks are not; export the bundle again"
@@ -39,6 +35,42 @@ pub(super) fn config(c: &Config) -> Result<()> {
         let (mib, most) = (bytes >> 20, MAX_SESSION >> 20);
         return Err(invalid(format!(
             "a session of this model would take {mib} MiB, more than {most}: the config's widths, layers or windows are wrong; \
+             export the bundle again"
+        )));
+    }
+    Ok(())
+}
+
+/// Checks what sessions of every kind go by.
+fn conversation(c: &Config) -> Result<()> {
+    within("user_delay_blocks", c.user_delay_blocks as usize, 1, 4)?;
+    within("agent_delay_blocks", c.agent_delay_blocks as usize, 0, 4)?;
+    within("audio.layers", c.audio.layers.len(), 1, 32)?;
+    check_audio_config(&c.audio)?;
+    real("session.bridge", c.session.bridge, 0.0, 30.0)
+}
+
+/// Checks the denoiser of the kind `mospa`.
+fn mospa(m: &MospaConfig) -> Result<()> {
+    within("mospa.frames", m.frames, 9, 7200)?;
+    within("mospa.patch", m.patch, 1, 64)?;
+    width("mospa.width", m.width, m.heads)?;
+    within("mospa.layers", m.layers, 1, 64)?;
+    within("mospa.mlp", m.mlp, 1, 16)?;
+    within("mospa.diffusion_steps", m.diffusion_steps, 1, 1000)?;
+    within("mospa.steps", m.steps, 1, m.diffusion_steps)?;
+    if !m.frames.is_multiple_of(m.patch) {
+        return Err(invalid(format!(
+            "mospa.frames is {}: it must be a multiple of mospa.patch, {}",
+            m.frames, m.patch
+        )));
+    }
+    let tokens = 3 + 2 * m.frames / m.patch;
+    let bytes = [4, tokens, m.width, 7 + m.mlp].iter().map(|n| *n as u128).product::<u128>();
+    if bytes > MAX_SESSION {
+        let (mib, most) = (bytes >> 20, MAX_SESSION >> 20);
+        return Err(invalid(format!(
+            "a clip of this model would take {mib} MiB, more than {most}: the config's frames, patch or width are wrong; \
              export the bundle again"
         )));
     }

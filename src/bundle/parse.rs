@@ -1,7 +1,7 @@
 //! From an opened file to a config that is sound and tensors that can be asked for.
 
 use super::{BundleFile, Tensors, check, corrupt, invalid};
-use crate::config::{Config, DramBundle, FORMAT, Kind};
+use crate::config::{Config, DramBundle, FORMAT, Kind, MospaBundle};
 use crate::error::{Error, ErrorKind, Result};
 
 /// Largest header that is parsed, bytes: metadata of thousands of tensors take well under one
@@ -58,5 +58,6 @@ fn parse_config(json: &str) -> Result<Config> {
     match serde_json::from_str::<Kinds>(json).map_err(unreadable)?.kind {
         Kind::Sarah => serde_json::from_str(json).map_err(unreadable),
         Kind::Dram => serde_json::from_str::<DramBundle>(json).map_err(unreadable).map(Config::from),
+        Kind::Mospa => serde_json::from_str::<MospaBundle>(json).map_err(unreadable).map(Config::from),
     }
 }

@@ -98,6 +98,7 @@ impl From<DramBundle> for Config {
             flow: FlowConfig::default(),
             student: None,
             dram: Some(dram),
+            mospa: None,
             session,
             gaze: None,
             quantisation,

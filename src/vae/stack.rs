@@ -3,8 +3,8 @@
 use crate::bundle::Tensors;
 use crate::config::VaeConfig;
 use crate::error::Result;
-use crate::kernels::{Exec, Kernels, KvCache, KvDtype, RowTable};
-use crate::nn::{Layer, LayerNorms, Norms, Pass, Rope, Rows, Sizes};
+use crate::kernels::{Exec, Kernels, KvCache, KvDtype};
+use crate::nn::{Affine, Layer, Pass, PlainNorms, Rope, Rows, Sizes};
 
 /// Weights of a stack of layers and its final norm.
 #[derive(Debug)]
@@ -15,18 +15,6 @@ pub(super) struct Stack {
     norms: PlainNorms,
     rope: Rope,
 }
-
-/// Layer norms with weights of their own: every row uses the one row of its norm's table.
-#[derive(Debug)]
-struct PlainNorms {
-    /// Before the attention and before the feed-forward of each layer.
-    layers: Vec<[Affine; 2]>,
-    last: Affine,
-}
-
-/// Bias then weight of a layer norm.
-#[derive(Debug)]
-struct Affine(Vec<f32>);
 
 /// Everything that changes while a stack streams.
 #[derive(Debug)]
@@ -51,13 +39,13 @@ impl Stack {
                 fc1: t.linear(kernels, &name("fc1"), mlp, &[d])?,
                 fc2: t.linear(kernels, &name("fc2"), d, &[mlp])?,
             });
-            norms.push([Affine::load(t, &name("ln1"), d)?, Affine::load(t, &name("ln2"), d)?]);
+            norms.push([affine(t, &name("ln1"), d)?, affine(t, &name("ln2"), d)?]);
         }
         Ok(Self {
             config: *c,
             tokens,
             layers,
-            norms: PlainNorms { layers: norms, last: Affine::load(t, &format!("{prefix}.ln_f"), d)? },
+            norms: PlainNorms { layers: norms, last: affine(t, &format!("{prefix}.ln_f"), d)? },
             rope: Rope::new(d / c.heads),
         })
     }
@@ -122,30 +110,9 @@ impl Stack {
     }
 }
 
-impl Norms for PlainNorms {
-    fn layer<'a>(&'a self, layer: usize, index: &'a [u32]) -> LayerNorms<'a> {
-        let [norm1, norm2] = &self.layers[layer];
-        LayerNorms { norm1: norm1.tables(index), gate1: None, norm2: norm2.tables(index), gate2: None }
-    }
-
-    fn last<'a>(&'a self, index: &'a [u32]) -> (RowTable<'a>, RowTable<'a>) {
-        self.last.tables(index)
-    }
-}
-
-impl Affine {
-    fn load(t: &Tensors<'_>, name: &str, d: usize) -> Result<Self> {
-        let mut table = t.f32(&format!("{name}.bias"), &[d])?;
-        table.extend(t.f32(&format!("{name}.weight"), &[d])?);
-        Ok(Self(table))
-    }
-
-    /// Shift (bias) and scale (weight) for the rows in `index`.
-    fn tables<'a>(&'a self, index: &'a [u32]) -> (RowTable<'a>, RowTable<'a>) {
-        let d = self.0.len() / 2;
-        let table = |offset| RowTable { table: &self.0, stride: 2 * d, offset, index };
-        (table(0), table(d))
-    }
+/// Reads `{name}.bias` and `{name}.weight`.
+fn affine(t: &Tensors<'_>, name: &str, d: usize) -> Result<Affine> {
+    Ok(Affine::new(&t.f32(&format!("{name}.bias"), &[d])?, &t.f32(&format!("{name}.weight"), &[d])?))
 }
 
 impl StackState {

@@ -30,6 +30,11 @@ const ROOMS: &[(&str, &str, &[&str])] = &[
     ("flow", "noise to latents", &["bundle", "config", "error", "frame", "kernels", "nn", "normaliser"]),
     ("dram", "steps of the featherweight tier", &["bundle", "config", "error", "frame", "kernels", "rig"]),
     (
+        "mospa",
+        "reactions to whole clips of sound",
+        &["audio", "bundle", "config", "error", "flow", "frame", "kernels", "nn", "normaliser", "rig"],
+    ),
+    (
         "engine",
         "a loaded bundle",
         &["audio", "bundle", "config", "dram", "error", "flow", "frame", "kernels", "normaliser", "pose", "rig", "vae"],

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use std::fmt;
 use visavis::internals::bundle::TensorInfo;
-use visavis::internals::config::{Config, DramConfig, LstmConfig, TcnConfig};
+use visavis::internals::config::{Config, DramConfig, LstmConfig, MospaConfig, TcnConfig};
 use visavis::internals::kernels::Scheme;
 use visavis::{BundleFile, Engine, Result, Sampler};
 
@@ -19,7 +19,7 @@ pub struct Contents {
 }
 
 /// Parts of a bundle: name prefix and what it is.
-const PARTS: [(&str, &str); 9] = [
+const PARTS: [(&str, &str); 10] = [
     ("audio.", "audio encoder"),
     ("vae.encoder.", "VAE encoder"),
     ("vae.decoder.", "VAE decoder"),
@@ -27,6 +27,7 @@ const PARTS: [(&str, &str); 9] = [
     ("student.", "single-step student"),
     ("monadic.", "monadic predictor"),
     ("dyadic.", "dyadic predictor"),
+    ("mospa.", "denoiser"),
     ("stats.", "normalisation"),
     ("idle.", "idle clip"),
 ];
@@ -66,6 +67,11 @@ impl fmt::Display for Contents {
                 schemes.iter().filter(|(_, n)| *n > 0).map(|(s, n)| format!("{n} matrices {s}")).collect();
             writeln!(f, "\n  quantised to {}: {}", q.scheme, list.join(", "))?;
         }
+        if let Some(mospa) = &c.mospa {
+            denoiser(mospa, f)?;
+            writeln!(f, "  rig      {} joints: {}", c.rig.joints.len(), joint_list(c))?;
+            return writeln!(f, "\n  licence  {}", c.licence);
+        }
         let stack: Vec<_> = c.audio.layers.iter().map(|l| format!("{}/{}", l.outputs, l.stride)).collect();
         writeln!(
             f,
@@ -91,6 +97,15 @@ impl fmt::Display for Contents {
 /// samplers.
 pub fn made_with(engine: &Engine, sampler: Sampler) -> String {
     if engine.needs_sarah().is_ok() { sampler.to_string() } else { engine.kind().to_owned() }
+}
+
+/// The denoiser of the kind `mospa`.
+fn denoiser(m: &MospaConfig, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let (layers, width, heads) = (m.layers, m.width, m.heads);
+    let seconds = m.frames as f64 / 30.0;
+    writeln!(f, "\n  denoiser {layers} layers of width {width}, {heads} heads, {} frames a token", m.patch)?;
+    writeln!(f, "  clip     {} frames ({seconds:.1} s) at once: `visavis react`, no sessions", m.frames)?;
+    writeln!(f, "  steps    {} of {} diffusion steps by default", m.steps, m.diffusion_steps)
 }
 
 /// The predictors of the kind `dram`.

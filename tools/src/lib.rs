@@ -12,6 +12,7 @@
 //! | [`report`] | what quantised bundles lose and cost |
 //! | [`soak`] | one session driven for hours |
 //! | [`mod@bench`] | block times, stages, memory |
+//! | [`react`] | a whole clip of sounds to motion |
 //! | [`serve`] | the live page's folder by the paths of requests |
 //! | [`trace`] | every stage of a session on disk |
 //!
@@ -23,6 +24,7 @@ pub mod eval;
 pub mod export;
 pub mod metrics;
 pub mod offline;
+pub mod react;
 pub mod recording;
 pub mod report;
 pub mod serve;

@@ -20,4 +20,27 @@ pub struct Recording {
     pub user_voice: Option<Vec<f32>>,
     /// The gaze target that was asked for, 0 to 1, or `None` for free gaze.
     pub gaze_target: Option<f32>,
+    /// Sounds in the room, where there are any.
+    pub sounds: Option<Sounds>,
+}
+
+/// Sounds in the room.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sounds {
+    /// Where each comes from, and when.
+    pub sources: Vec<Source>,
+    /// What the agent hears of all of them, the mean of its ears: 24 kHz, -1 to 1, starting with
+    /// frame 0.
+    pub heard: Vec<f32>,
+}
+
+/// A source of sound.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Source {
+    /// What it is called, plain text.
+    pub name: String,
+    /// Where it is in the world, metres.
+    pub position: Vec3,
+    /// When it begins and ends, seconds.
+    pub seconds: [f64; 2],
 }

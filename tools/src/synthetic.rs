@@ -9,5 +9,5 @@ pub(crate) fn walk(frames: usize) -> Recording {
     let synthetic::Walk { rig, frames, user } = synthetic::walk(frames);
     let voice = |hz: f32| Some((0..frames.len() * FRAME_SAMPLES).map(|i| 0.3 * (i as f32 * hz).sin()).collect());
     let (agent_voice, user_voice) = (voice(0.05), voice(0.08));
-    Recording { rig, frames, user, agent_voice, user_voice, gaze_target: Some(0.8) }
+    Recording { rig, frames, user, agent_voice, user_voice, gaze_target: Some(0.8), sounds: None }
 }

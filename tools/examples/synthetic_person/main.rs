@@ -15,6 +15,7 @@ fn main() -> ExitCode {
             ("Motion".to_owned(), "procedural, no model".to_owned()),
             ("Voices".to_owned(), "synthetic syllables".to_owned()),
         ],
+        method: None,
         live: None,
     };
     match viewer::write(&path, &person::recording(30.0), &meta) {

@@ -156,6 +156,7 @@ pub fn recording(seconds: f32) -> Recording {
         agent_voice: talk(speaking, 190.0),
         user_voice: talk(|t| speaking(t + 5.0), 115.0),
         gaze_target: Some(0.9),
+        sounds: None,
     }
 }
 

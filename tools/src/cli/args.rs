@@ -43,6 +43,8 @@ pub enum Command {
     Soak(super::soak::SoakArgs),
     /// Serves the live page on this machine: meet the agent in a browser
     Live(super::live::LiveArgs),
+    /// Reacts to sounds around the agent, eight seconds at a time (bundles of the kind mospa)
+    React(super::react::ReactArgs),
     /// Runs given conditioning and noise through a bundle and writes every stage
     Trace(TraceArgs),
 }

@@ -29,7 +29,8 @@ pub fn generate(args: &RunArgs, talk: &Conversation, title: &str, subtitle: &str
     line.finish();
     let summary = Summary::of(&outcome.recording);
     let live = out.live_page();
-    let meta = Meta { title: title.to_owned(), subtitle: subtitle.to_owned(), facts: args.facts(&engine), live };
+    let meta =
+        Meta { title: title.to_owned(), subtitle: subtitle.to_owned(), facts: args.facts(&engine), method: None, live };
     let paths = out.write(&outcome.recording, &meta, &summary)?;
     print(&report(args, &engine, &outcome, &summary, &paths))
 }

@@ -15,6 +15,7 @@ mod inspect;
 mod live;
 mod progress;
 mod quantize;
+mod react;
 mod report;
 mod soak;
 mod trace;
@@ -41,6 +42,7 @@ pub fn main() -> ExitCode {
             Command::Soak(args) => soak::run(&args),
             Command::Trace(args) => trace::run(&args),
             Command::Live(args) => live::run(&args),
+            Command::React(args) => react::run(&args),
         },
         Err(e) => return usage(&e),
     };

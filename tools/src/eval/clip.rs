@@ -243,6 +243,7 @@ impl Segment {
             agent_voice: self.agent(),
             user_voice: self.user(),
             gaze_target: None,
+            sounds: None,
         }
     }
 

@@ -153,6 +153,7 @@ impl Run {
                 agent_voice: voice(&recording.agent_voice),
                 user_voice: voice(&recording.user_voice),
                 gaze_target: recording.gaze_target,
+                sounds: None,
             })
         };
         let last = frames.len() - length;

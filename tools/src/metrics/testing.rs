@@ -43,7 +43,7 @@ pub fn recording(n: usize, change: impl Fn(usize, f32, &mut [Vec3])) -> Recordin
             Frame { index: i as u64, time, root, hips: positions[0], global, ..Frame::empty(rest.len()) }
         })
         .collect();
-    Recording { rig, frames, user: vec![None; n], agent_voice: None, user_voice: None, gaze_target: None }
+    Recording { rig, frames, user: vec![None; n], agent_voice: None, user_voice: None, gaze_target: None, sounds: None }
 }
 
 /// Fails unless `a` is `b` within `tolerance`.

@@ -240,6 +240,7 @@ pub fn run(session: &mut Session, talk: &Conversation, progress: &mut dyn FnMut(
         agent_voice: talk.agent.clone(),
         user_voice: talk.user.clone(),
         gaze_target: session.options().gaze,
+        sounds: None,
     };
     Ok(Outcome { recording, stats: session.stats(), elapsed })
 }

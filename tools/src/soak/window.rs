@@ -62,6 +62,7 @@ impl Window {
             agent_voice: None,
             user_voice: None,
             gaze_target: None,
+            sounds: None,
         };
         let spare = (0..PIECE + 4).map(|_| Frame::empty(rig.len())).collect();
         Self { recording, spare, sums: [(0.0, 0.0); 7] }

@@ -3,7 +3,7 @@
 
 use super::Meta;
 use crate::metrics::foot_clearances;
-use crate::recording::Recording;
+use crate::recording::{Recording, Sounds, Source};
 use glam::{Quat, Vec3};
 use serde_json::{Value, json};
 use visavis::{BLOCK_FRAMES, FPS, Frame, SAMPLE_RATE, Sampler};
@@ -44,7 +44,7 @@ pub fn json(recording: &Recording, meta: &Meta) -> String {
         "eyes": rig.eyes,
         "headBack": rig.head_back,
         "gazeTarget": recording.gaze_target,
-        "samplers": samplers.iter().map(|s| sampler_name(*s)).collect::<Vec<_>>(),
+        "samplers": samplers.iter().map(|s| meta.method.clone().unwrap_or_else(|| sampler_name(*s))).collect::<Vec<_>>(),
         "step": STEP,
         "root": floats(frames.iter().flat_map(|f| [f.root.x as f32, f.root.z as f32, f.root.yaw as f32])),
         "hips": floats(frames.iter().flat_map(|f| f.hips.to_array())),
@@ -59,9 +59,17 @@ pub fn json(recording: &Recording, meta: &Meta) -> String {
         "audioRate": SAMPLE_RATE / 2,
         "agentVoice": voice(recording.agent_voice.as_deref()),
         "userVoice": voice(recording.user_voice.as_deref()),
+        "sounds": recording.sounds.as_ref().map(sources),
+        "heard": voice(recording.sounds.as_ref().map(|sounds| sounds.heard.as_slice())),
     });
     // '<' occurs in JSON only inside strings, where it may be written as an escape.
     value.to_string().replace('<', "\\u003c")
+}
+
+/// Sources of sound: what, where, and from when to when in seconds.
+fn sources(sounds: &Sounds) -> Value {
+    let source = |s: &Source| json!({ "name": s.name, "at": s.position.to_array(), "seconds": s.seconds });
+    sounds.sources.iter().map(source).collect()
 }
 
 fn sampler_name(sampler: Sampler) -> String {
@@ -192,7 +200,7 @@ mod tests {
         frames[1].gaze = Some(0.75);
         let user = vec![None, Some(Vec3::new(0.1, 1.6, 2.0)), None];
         let agent_voice = Some((0..2400).map(|i| 0.5 * (f64::from(i) * 0.05).sin() as f32).collect());
-        Recording { rig, frames, user, agent_voice, user_voice: None, gaze_target: Some(0.5) }
+        Recording { rig, frames, user, agent_voice, user_voice: None, gaze_target: Some(0.5), sounds: None }
     }
 
     fn parsed(recording: &Recording, meta: &Meta) -> Value {
@@ -220,7 +228,12 @@ mod tests {
         assert!((f32::from(local[4]) / 32767.0 - 0.25_f32.sin()).abs() < 2e-5);
         let decoded = i16s(&v["decoded"]);
         assert!((f32::from(decoded[6 + 4]) * STEP - 0.2).abs() < STEP);
-        assert!(v["dyadic"].is_null());
+        assert!(v["dyadic"].is_null() && v["sounds"].is_null() && v["heard"].is_null());
+        let source = Source { name: "bang".into(), position: Vec3::new(2.0, 0.5, -3.0), seconds: [1.0, 2.5] };
+        let sounds = Some(Sounds { sources: vec![source], heard: vec![0.0; 240] });
+        let loud = parsed(&Recording { sounds, ..r.clone() }, &Meta::default());
+        assert_eq!(loud["sounds"], json!([{ "name": "bang", "at": [2.0, 0.5, -3.0], "seconds": [1.0, 2.5] }]));
+        assert_eq!(i16s(&loud["heard"]), [0; 120]);
         let mut told = r.clone();
         told.frames.iter_mut().for_each(|frame| frame.dyadic = vec![0.0, 1.0]);
         assert_eq!(unbase64(parsed(&told, &Meta::default())["dyadic"].as_str().unwrap()), [0, 255, 0, 255, 0, 255]);
@@ -261,6 +274,7 @@ mod tests {
             title: "</script><script>alert(1)</script><!-- \u{2028} \"quoted\" 안녕".into(),
             subtitle: "{{script}} <b>".into(),
             facts: vec![("a<b".into(), "\\".into())],
+            method: Some("<i>".into()),
             live: None,
         };
         let text = json(&recording(), &meta);
@@ -268,6 +282,7 @@ mod tests {
         let v: Value = serde_json::from_str(&text).unwrap();
         assert_eq!(v["title"], meta.title);
         assert_eq!(v["subtitle"], meta.subtitle);
+        assert_eq!(v["samplers"][0], "<i>");
         assert_eq!(v["facts"][0], json!(["a<b", "\\"]));
         let page = super::super::render(&recording(), &meta);
         assert_eq!(page.to_ascii_lowercase().matches("</script>").count(), 2);

@@ -26,6 +26,8 @@ pub struct Meta {
     /// Facts for the "about" panel as (name, value), plain text: model, sampler, seed, kernels,
     /// licence and so on.
     pub facts: Vec<(String, String)>,
+    /// What made the motion, where it is not the frames' sampler; plain text.
+    pub method: Option<String>,
     /// Relative address of the live page, where it lies beside the recording.
     pub live: Option<String>,
 }

@@ -1,7 +1,7 @@
 // Both voices through Web Audio, in step with the picture. While sound plays, its clock is the clock.
 
 function createAudio(d) {
-  const voices = [["agent", d.agentVoice, -0.25], ["user", d.userVoice, 0.25]].filter(([, samples]) => samples && samples.length);
+  const voices = [["agent", d.agentVoice, -0.25], ["user", d.userVoice, 0.25], ["heard", d.heard, 0]].filter(([, samples]) => samples && samples.length);
   const audio = { available: voices.length > 0, muted: false };
   let context = null, gain = null, buffers = [], sources = [], started = null;
 

@@ -23,7 +23,7 @@ function loadRecording() {
   for (const name of ["local", "decoded"]) d[name] = shorts(d[name]);
   for (const name of ["sampler", "touch"]) d[name] = bytes(d[name]);
   d.dyadic = d.dyadic === null ? null : bytes(d.dyadic);
-  for (const name of ["agentVoice", "userVoice"]) d[name] = d[name] === null ? null : shorts(d[name]);
+  for (const name of ["agentVoice", "userVoice", "heard"]) d[name] = d[name] === null ? null : shorts(d[name]);
   d.index = new Map(d.joints.map((joint, j) => [joint.name, j]));
   d.duration = d.frames / d.fps;
   // Rest positions of the joints: offsets summed from the hips down.

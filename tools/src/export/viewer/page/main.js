@@ -142,7 +142,9 @@ function start() {
     const covered = clean ? 0 : $("transport").offsetHeight / Math.max(1, h);
     const view = camera.at(state.time, pose, canvas.width, canvas.height, covered * 0.95);
     const fromUser = camera.fromUser && pose.user !== null;
+    const sources = (d.sounds ?? []).map(({ at, seconds: [from, to] }) => ({ at, on: state.time >= from && state.time < to, age: Math.max(0, state.time - from) }));
     const lines = d.frames ? sceneLines(d, pose, {
+      sources,
       fromUser, trail: trailLines(d, pieces, pose.frame), colour: timeColour(pose.frame / d.frames), joints: state.joints ? decodedAt(d, pose.frame) : null,
     }) : [];
     renderer.draw({ pose, views: [view], lines, fromUser, joints: state.joints, theme: theme() });

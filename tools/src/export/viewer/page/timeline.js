@@ -1,4 +1,4 @@
-// The lanes at the foot of the page: both voices, gaze, whom the body follows where that is told, and the play head. Click or drag to seek.
+// The lanes at the foot of the page: both voices or what is heard, gaze, whom the body follows where that is told, and the play head. Click or drag to seek.
 
 function createTimeline(canvas, d, onSeek) {
   const g = canvas.getContext("2d");
@@ -7,6 +7,7 @@ function createTimeline(canvas, d, onSeek) {
     { name: "User", kind: "voice", samples: d.userVoice, colour: "--user" },
     { name: "Gaze", kind: "gaze" },
   ];
+  if (d.sounds) lanes.splice(0, 2, { name: "Heard", kind: "voice", samples: d.heard, colour: "--user" });
   if (d.dyadic) lanes.push({ name: "Dyadic", kind: "dyadic" });
   const still = document.createElement("canvas");
   let key = "";

@@ -1,7 +1,8 @@
 // Lines as thin triangles, for both renderers: {points: [from, to], width (m), colour: [r, g, b, a] at both ends}.
 
 // Everything drawn as lines in one moment.
-// Options: trail (lines of the user's way), colour (the user's mark), joints (decoded positions), gazeLine.
+// Options: trail (lines of the user's way), colour (the user's mark), joints (decoded positions), gazeLine,
+// sources (of sound: at, whether it is on, seconds since it began).
 function sceneLines(d, pose, options) {
   const out = [];
   const line = (from, to, width, c0, c1 = c0, flat = false) => out.push({ from, to, width, c0, c1, flat });
@@ -18,6 +19,7 @@ function sceneLines(d, pose, options) {
     line(start, add(pose.eyes, scale(pose.facing, far)), 0.011, [...c, 0.9], [...c, 0]);
     if (pose.user && !options.fromUser) dashes(pose.eyes, add(pose.user, scale(unit(sub(pose.eyes, pose.user)), 0.13)), c);
   }
+  for (const source of options.sources ?? []) glow(source);
   if (options.joints) {
     const decoded = options.joints;
     decoded.forEach((p, j) => {
@@ -33,6 +35,22 @@ function sceneLines(d, pose, options) {
     for (let k = 0; k < 28; k++) {
       const p = (a) => add(centre, [radius * Math.sin(a), 0, radius * Math.cos(a)]);
       line(p((k * Math.PI) / 14), p(((k + 1) * Math.PI) / 14), 0.014, colour, colour, true);
+    }
+  }
+
+  // A star that is bright while it sounds, with rings that go out from it, above its place on the floor.
+  function glow({ at, on, age }) {
+    const colour = [1, 0.62, 0.16], light = on ? 0.75 + 0.2 * Math.sin(age * 9) : 0.22, reach = on ? 0.17 : 0.08;
+    for (let k = 0; k < 12; k++) {
+      const a = (k * Math.PI) / 6, tilt = Math.PI * (k % 3 - 1) / 3;
+      const ray = scale([Math.cos(a) * Math.cos(tilt), Math.sin(tilt), Math.sin(a) * Math.cos(tilt)], reach);
+      line(at, add(at, ray), on ? 0.05 : 0.02, [...colour, light], [...colour, 0]);
+    }
+    const foot = [at[0], 0.006, at[2]];
+    line(foot, at, 0.006, [...colour, 0.5 * light], [...colour, light]);
+    for (let k = 0; k < (on ? 3 : 1); k++) {
+      const out = on ? (age * 0.8 + k / 3) % 1 : 0;
+      ring(foot, 0.12 + 0.9 * out, [...colour, light * (1 - out)]);
     }
   }
 
