@@ -44,8 +44,8 @@ fn what_cannot_be_is_a_typed_error_and_what_is_too_loud_is_bounded() {
     assert_eq!(kind(&[sound([2.0, 1.0, 1.0], 60.0, 0.5)], &OPTIONS), audio);
     assert_eq!(kind(&[Sound { samples: Vec::new(), ..good.clone() }], &OPTIONS), audio);
     assert_eq!(kind(&[Sound { samples: vec![f32::NAN], ..good.clone() }], &OPTIONS), audio);
-    assert_eq!(kind(&[good.clone()], &Options { steps: Some(0), ..OPTIONS }), argument);
-    assert_eq!(kind(&[good.clone()], &Options { steps: Some(1001), ..OPTIONS }), argument);
+    assert_eq!(kind(std::slice::from_ref(&good), &Options { steps: Some(0), ..OPTIONS }), argument);
+    assert_eq!(kind(std::slice::from_ref(&good), &Options { steps: Some(1001), ..OPTIONS }), argument);
     assert_eq!(kind(&vec![good; MAX_SOUNDS], &OPTIONS), Ok(()));
     let loud = run(&reactor, &[sound([0.5, 1.6, 0.0], 0.0, 1e6)], &OPTIONS).unwrap();
     assert!(loud.clipped > 1000);
