@@ -198,7 +198,7 @@ def fake_corpus(folder, n=6):
     for split in ("train", "val", "test"):
         place = folder / split
         place.mkdir(parents=True)
-        np.save(place / "motion.npy", np.stack([x + 0.05 * rng.standard_normal(layout.SIZE) for _ in range(n)]).astype(np.float32))
+        np.save(place / "motion.npy", np.stack([x + 0.002 * rng.standard_normal(layout.SIZE) for _ in range(n)]).astype(np.float32))
         for ear in ("left", "right"):
             np.save(place / f"{ear}.npy", rng.standard_normal((n, 240, 132)).astype(np.float32))
         np.save(place / "location.npy", rng.standard_normal((n, 3)).astype(np.float32))
