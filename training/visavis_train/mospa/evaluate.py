@@ -14,6 +14,7 @@ import torch
 from scipy.linalg import sqrtm
 
 from ..motion import rig
+from ..train.common import mixed
 from . import diffusion, extractor, layout, nets, react, train
 from .data import Split
 
@@ -129,13 +130,15 @@ def main():
     add("random", data.poses(np.random.default_rng(1).integers(0, 2 * len(data), len(which)).tolist()))
     net, state = train.load(args.net)
     add("nearest neighbour", nearest(data, held, which, net))
-    masked = lambda state: None if state["genre"] else nets.UNKNOWN
-    with torch.autocast("cpu", torch.bfloat16):
-        for steps in map(int, args.steps.split(",")):
-            add(f"model, {steps} steps", diffusion.motions(net, held, which, steps, genre=masked(state)))
-        for name, _, path in (a.partition("=") for a in args.also):
-            other, state = train.load(path)
-            add(name, diffusion.motions(other, held, which, int(args.steps.split(",")[0]), genre=masked(state)))
+
+    def answers(net, state, steps):
+        with mixed("cpu"):
+            return diffusion.motions(net, held, which, steps, genre=None if state["genre"] else nets.UNKNOWN)
+
+    for steps in map(int, args.steps.split(",")):
+        add(f"model, {steps} steps", answers(net, state, steps))
+    for name, _, path in (a.partition("=") for a in args.also):
+        add(name, answers(*train.load(path), int(args.steps.split(",")[0])))
 
 
 if __name__ == "__main__":

@@ -48,6 +48,8 @@ class Mospa(nn.Module):
         for layer in self.layers:
             layer.attn = Full(width, heads)
         self.ln_f, self.out = nn.LayerNorm(width, eps=EPS), nn.Linear(width, patch * layout.SIZE)
+        nn.init.zeros_(self.out.weight)              # begins at the mean pose, without jitter
+        nn.init.zeros_(self.out.bias)
         for name, size in (("motion", layout.SIZE), ("feature", features.SIZE)):
             self.register_buffer(name + "_mean", torch.zeros(size))
             self.register_buffer(name + "_std", torch.ones(size))

@@ -21,7 +21,7 @@ from .data import Split
 
 FEET = [rig.INDEX[n] for n in ("leftFoot", "leftToes", "rightFoot", "rightToes")]
 NO_GENRE, NO_PLACE = 0.1, 0.2
-EVERY = 8                                        # forward kinematics of every eighth pair of frames: the loss' cost
+EVERY = 16                                       # forward kinematics of every sixteenth pair of frames: the loss' cost
 
 
 def change(x):
@@ -42,7 +42,7 @@ def joints(x):
 def losses(net, made, clean):
     """The paper's terms of standardised motions [B, T, D]; the sum and its parts."""
     error, moved = made - clean, change(made) - change(clean)
-    speed = 8.0                                  # a frame's change is so much smaller than the spread of poses
+    speed = 3.0                                  # a frame's change is smaller than the spread of poses
     plain, turn = error.square().mean() + (speed * moved).square().mean(), error[..., layout.ROTATIONS].square().mean()
     first = torch.arange(int(torch.randint(EVERY, (1,))), made.shape[1] - 1, EVERY)
     at = torch.stack([first, first + 1], 1).flatten()
