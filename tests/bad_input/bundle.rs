@@ -252,7 +252,8 @@ fn featherweight_bundles_are_checked_as_strictly() {
     for backbone in ["tcn", "lstm"] {
         Engine::from_bytes(Parts::dram(backbone).bytes(), NAME).unwrap();
         for (kind, part, path, value) in [
-            (BundleInvalid, "unknown variant `mospa`", "/kind", "mospa".into()),
+            (BundleInvalid, "unknown variant `rnn`", "/kind", "rnn".into()),
+            (BundleInvalid, "missing field `mospa`", "/kind", "mospa".into()),
             (BundleInvalid, "missing field", "/kind", "sarah".into()),
             (BundleInvalid, "monadic.width is 0", "/dram/monadic/width", 0.into()),
             (BundleInvalid, "dyadic.width is 70000", "/dram/dyadic/width", 70_000.into()),
