@@ -1,7 +1,7 @@
 /* A plugin for qemu-aarch64 (7.2 or newer, -plugin): counts instructions between markers.
  *
  * A marker is HINT #62, which processors take for a NOP, or the system call umask, for programs whose machine code is not ours
- * (JavaScript engines). At each one the counts since the last marker go to stderr as
+ * (JavaScript engines). At each one, and at the end, the counts since the last marker go to stderr as
  * `insn <instructions> <int8 multiply-adds> <16-byte vector loads>`. Counted are all instructions of the process; multiply-adds are those of SDOT and
  * UDOT (16 a 128-bit instruction), SMMLA and USMMLA (32), of rows and columns that only pad a tile too. One thread only.
  */
@@ -21,6 +21,7 @@ extern const void *qemu_plugin_insn_data(const struct qemu_plugin_insn *);
 extern void qemu_plugin_register_vcpu_insn_exec_inline(struct qemu_plugin_insn *, int, void *, uint64_t);
 extern void qemu_plugin_register_vcpu_syscall_cb(qemu_plugin_id_t, void (*)(qemu_plugin_id_t, vcpu_index, int64_t, uint64_t, uint64_t, uint64_t, uint64_t,
                                                  uint64_t, uint64_t, uint64_t, uint64_t));
+extern void qemu_plugin_register_atexit_cb(qemu_plugin_id_t, void (*)(qemu_plugin_id_t, void *), void *);
 extern void qemu_plugin_register_vcpu_insn_exec_cb(struct qemu_plugin_insn *, void (*)(vcpu_index, void *), int, void *);
 
 __attribute__((visibility("default"))) int qemu_plugin_version = 1;
@@ -37,6 +38,11 @@ static void called(qemu_plugin_id_t id, vcpu_index cpu, int64_t number, uint64_t
                    uint64_t g, uint64_t h) {
   (void)id, (void)a, (void)b, (void)c, (void)d, (void)e, (void)f, (void)g, (void)h;
   if (number == 166) marker(cpu, NULL); /* umask on arm64 */
+}
+
+static void ended(qemu_plugin_id_t id, void *unused) {
+  (void)id;
+  marker(0, unused);
 }
 
 static unsigned mac_count(uint32_t i) {
@@ -78,5 +84,6 @@ __attribute__((visibility("default"))) int qemu_plugin_install(qemu_plugin_id_t 
   (void)info, (void)argc, (void)argv;
   qemu_plugin_register_vcpu_tb_trans_cb(id, translated);
   qemu_plugin_register_vcpu_syscall_cb(id, called);
+  qemu_plugin_register_atexit_cb(id, ended, NULL);
   return 0;
 }

@@ -53,6 +53,8 @@ done
 (cd "$out/here" && sha256sum motion.*)
 
 echo '-- tests: sessions on one and two threads, inputs of other threads, files, paths'
+# Tests that start the command start it without wine.sh.
+cp "$out/bcryptprimitives.dll" "$target/x86_64-pc-windows-gnu/release/"
 tests -p visavis --test session --test inputs
 tests -p visavis-tools --test windows
 tests -p visavis-capi --test paths
