@@ -187,7 +187,7 @@ def test_user_nods_where_the_agent_ends_and_the_agent_mirrors():
         assert np.abs(np.linalg.norm(q[:, 5] - q[:, 4], axis=-1) - np.linalg.norm(rig.OFFSETS[5])).max() < 1e-6
         moved = np.abs(turned - r).max((1, 2, 3)) > 1e-3
         assert not moved.any() or nods
-        assert np.array_equal(turned[:, 6:], r[:, 6:])
+        assert np.abs(turned[:, 6:] - r[:, 6:]).max() < 1e-12  # by way of the local rotations
         changed += moved.any()
     assert changed
 
