@@ -42,6 +42,7 @@ native!("Java_org_visavis_Native_setNaturalGaze": set_natural_gaze(session: jlon
 native!("Java_org_visavis_Native_setGuidance": set_guidance(session: jlong, weight: jfloat, gaze: jfloat));
 native!("Java_org_visavis_Native_setSampler": set_sampler(session: jlong, sampler: JString));
 native!("Java_org_visavis_Native_setBudget": set_budget(session: jlong, milliseconds: jfloat));
+native!("Java_org_visavis_Native_setFallback": set_fallback(session: jlong, engine: jlong));
 native!("Java_org_visavis_Native_reportBlockTime": report_block_time(session: jlong, milliseconds: jdouble));
 native!("Java_org_visavis_Native_sampler": sampler(session: jlong) -> JString);
 native!("Java_org_visavis_Native_pollBuffer": poll_buffer(session: jlong, now: jdouble, out: java.nio.FloatBuffer, position: jint, count: jint) -> jint);
@@ -245,6 +246,11 @@ fn set_sampler<'l>(env: &mut Env<'l>, _: JClass<'l>, session: jlong, sampler: JS
 
 fn set_budget<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, milliseconds: jfloat) -> Outcome {
     around(session, |s| Ok(s.controls().set_budget(milliseconds)?))
+}
+
+fn set_fallback<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, engine: jlong) -> Outcome {
+    let engine = ENGINES.get(engine)?;
+    with(session, |s| Ok(s.set_fallback(&engine)?))
 }
 
 fn report_block_time<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, milliseconds: jdouble) -> Outcome {

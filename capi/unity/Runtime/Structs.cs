@@ -92,5 +92,6 @@ namespace Visavis
         public ulong GovernorMissed, GovernorDown, GovernorUp, GovernorHeldBlocks, GovernorCatchUpPasses, GuardTrips, GuardHeldFrames;
         public ulong AgentNonFiniteSamples, AgentBadRateSamples, AgentContendedSamples;
         public ulong UserNonFiniteSamples, UserBadRateSamples, UserContendedSamples;
+        public ulong GovernorFallbackBlocks;
     }
 }

@@ -70,6 +70,8 @@ final class Native {
 
     static native void setBudget(long session, float milliseconds);
 
+    static native void setFallback(long session, long engine);
+
     static native void reportBlockTime(long session, double milliseconds);
 
     static native String sampler(long session);

@@ -101,6 +101,10 @@ public final class VisavisEngine implements AutoCloseable {
         return skeleton;
     }
 
+    long handle() {
+        return handle;
+    }
+
     /** Lets go of the bundle. Sessions live on. Closing twice does nothing. */
     @Override
     public void close() {
