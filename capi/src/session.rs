@@ -124,7 +124,7 @@ pub unsafe extern "C" fn visavis_session_free(session: *mut VisavisSession) {
 }
 
 /// Appends to the agent's own voice: `count` mono samples, full scale 1, of `rate` Hz (8000 to
-/// 192000), up to a minute ahead of time. More is dropped and counted. Sound that has not come when
+/// 192000), up to a minute ahead of time (voice_ahead of the options). More is dropped and counted. Sound that has not come when
 /// a block is computed is silence there, is counted, and is heard later. A voice that was never
 /// pushed is absent, which is not the same as silent. Samples that are not finite become silence,
 /// are counted, and make the status VISAVIS_STATUS_AUDIO; all others are taken. From any thread,

@@ -11,7 +11,7 @@ use visavis::stats::{SessionStats, VoiceStats};
 pub struct VisavisVoiceStats {
     /// Silence in place of sound that had not come, while the voice was present.
     pub underrun_samples: u64,
-    /// Dropped because a minute of sound was waiting already.
+    /// Dropped because so much sound was waiting already, a minute by default.
     pub overflow_samples: u64,
     /// Clipped to 8 times full scale, input samples: a sign of integers pushed as floats.
     pub clipped_samples: u64,

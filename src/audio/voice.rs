@@ -7,7 +7,7 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{BLOCK_SAMPLES, SAMPLE_RATE};
 
 /// Seconds of sound that a [`Voice::new`] holds ahead of the block that was taken last (5.8 MB).
-pub const VOICE_SECONDS: u32 = 60;
+pub const VOICE_SECONDS: f64 = 60.0;
 
 /// A voice on the session's time line: sample `n` is heard `n / 24000` s after the session's start.
 ///
@@ -37,9 +37,10 @@ impl Voice {
         Self::with_capacity(VOICE_SECONDS)
     }
 
-    /// A voice that holds `seconds` (1 to 3600, else clamped) beyond the block that was taken last.
-    pub fn with_capacity(seconds: u32) -> Self {
-        let input = VoiceInput::new(seconds.clamp(1, 3600) as usize * SAMPLE_RATE as usize);
+    /// A voice that holds `seconds` (0.5 to 3600, else clamped) beyond the block that was taken
+    /// last.
+    pub fn with_capacity(seconds: f64) -> Self {
+        let input = VoiceInput::new((seconds.clamp(0.5, 3600.0) * f64::from(SAMPLE_RATE)) as usize);
         Self { input, seen: Glimpse::default(), start: 0, at: 0, underrun: 0 }
     }
 

@@ -107,6 +107,11 @@ export interface SessionOptions {
   /** Whether planted feet are kept in place, and frames that no body could show are replaced; true by default. */
   stance?: boolean;
   guard?: boolean;
+  /**
+   * Seconds of sound that each voice may be ahead of the block that was computed last, 0.5 to 60 (default); what is more is dropped and
+   * counted. A second takes 192 KB: a crowd that hears sound as it comes does with the least.
+   */
+  voiceAhead?: number;
   /** `real` (default): blocks are computed as time goes by. `manual`: by {@link Session.advance}. */
   clock?: "real" | "manual";
 }
@@ -135,7 +140,7 @@ export interface Session {
   /** Sound of the user: mono, full scale 1, `rate` 8000 to 192000 Hz. Pushed as it is heard. */
   pushUserVoice(samples: Float32Array, rate: number): void;
   /**
-   * Sound that the agent says, up to a minute ahead. Resolves to the session time at which its first sample is heard;
+   * Sound that the agent says, up to a minute ahead ({@link SessionOptions.voiceAhead}). Resolves to the session time at which its first sample is heard;
    * play it at that time plus {@link Session.delay}, and lips and hands fit.
    */
   pushAgentVoice(samples: Float32Array, rate: number): Promise<number>;

@@ -185,6 +185,7 @@ fn what_is_wrong_has_a_status_and_a_text() {
             (r#"{"colour":1}"#, "unknown field `colour`"),
             (r#"{"sampler":"best"}"#, "unknown sampler"),
             (r#"{"gaze":2}"#, "gaze target 2"),
+            (r#"{"voiceAhead":0.4}"#, "voice_ahead is 0.4"),
         ] {
             let (status, text) = session(engine, options).unwrap_err();
             assert_eq!(status, 1);

@@ -181,6 +181,11 @@ test("what is wrong is refused with its kind, what is only odd is counted", asyn
   const engine = await load();
   await assert.rejects(engine.session({ sampler: "best" }).ready, kind("argument", /midpoint4/));
   await assert.rejects(engine.session({ colour: 1 }).ready, kind("argument", /colour/));
+  await assert.rejects(engine.session({ voiceAhead: 0.4 }).ready, kind("argument", /0\.5 to 60/));
+  const brief = engine.session({ clock: "manual", voiceAhead: 0.5 });
+  await brief.pushAgentVoice(new Float32Array(24000), 24000);
+  assert.equal((await brief.stats()).agentVoice.overflowSamples, 12000);
+  brief.close();
   assert.throws(() => engine.session({ clock: "sun" }), kind("argument"));
   assert.throws(() => engine.session({ gaze: "much" }), kind("argument"));
   const session = engine.session({ clock: "manual" });

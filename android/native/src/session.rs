@@ -24,7 +24,8 @@ const JOINT: usize = 11;
 
 native!("Java_org_visavis_Native_sessionNew": session_new(
     engine: jlong, seed: jlong, threads: jint, core_mask: jlong, sampler: JString, gaze: jfloat, guidance: jfloat,
-    gaze_guidance: jfloat, temperature: jfloat, x: jdouble, z: jdouble, yaw: jdouble, stance: jboolean, guard: jboolean, budget: jfloat
+    gaze_guidance: jfloat, temperature: jfloat, x: jdouble, z: jdouble, yaw: jdouble, stance: jboolean, guard: jboolean, budget: jfloat,
+    voice_ahead: jdouble
 ) -> jlong);
 native!("Java_org_visavis_Native_sessionClose": session_close(session: jlong) -> jboolean);
 native!("Java_org_visavis_Native_pushBuffer": push_buffer(session: jlong, voice: jint, buffer: java.nio.FloatBuffer, position: jint, count: jint, rate: jint));
@@ -101,6 +102,7 @@ fn session_new<'l>(
     stance: jboolean,
     guard: jboolean,
     budget: jfloat,
+    voice_ahead: jdouble,
 ) -> Outcome<jlong> {
     let engine = ENGINES.get(engine)?;
     // NaN is what Java's options hold for "the bundle's".
@@ -118,6 +120,7 @@ fn session_new<'l>(
         stance,
         guard,
         governor: Governor::within(budget),
+        voice_ahead,
         ..Default::default()
     };
     Ok(SESSIONS.insert(Arc::new(SharedSession::new(engine.session(options)?))))

@@ -34,7 +34,7 @@ namespace Visavis
         /// <summary>Their joints: joint j of frame i is Joints[i * JointCount + j].</summary>
         public Joint[] Joints { get; }
 
-        /// <summary>Appends mono samples, full scale 1, of 8000 to 192000 Hz, up to a minute ahead of time; more is dropped and counted.</summary>
+        /// <summary>Appends mono samples, full scale 1, of 8000 to 192000 Hz, up to a minute (SessionOptions.VoiceAhead) ahead of time; more is dropped and counted.</summary>
         /// <exception cref="ArgumentException">A bad rate: nothing was taken. Samples that are not finite: silence is in their place, all others were taken.</exception>
         public void PushAudio(Speaker speaker, float[] samples, int offset, int count, int rate)
         {

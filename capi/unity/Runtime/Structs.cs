@@ -49,6 +49,7 @@ namespace Visavis
         public uint Stance, Guard;
         public float BudgetMs;
         public uint Reserved;
+        public double VoiceAhead;
     }
 
     /// <summary>One frame without its joints, session world: visavis_frame.</summary>

@@ -64,6 +64,8 @@ final class ErrorTest {
             throwsWith(ARGUMENT, "temperature", () -> engine.newSession(new SessionOptions().temperature(3)));
             throwsWith(ARGUMENT, "not a number", () -> new SessionOptions().gaze(Float.NaN));
             throwsWith(ARGUMENT, "budget", () -> engine.newSession(new SessionOptions().budget(1000)));
+            throwsWith(ARGUMENT, "voice_ahead", () -> engine.newSession(new SessionOptions().voiceAhead(0.4)));
+            throwsWith(ARGUMENT, "voice_ahead", () -> engine.newSession(new SessionOptions().voiceAhead(Double.NaN)));
             throwsWith(ARGUMENT, "budget", () -> session.setBudget(0.5f));
             throwsWith(ARGUMENT, "block time", () -> session.reportBlockTime(-1));
             throwsWith(ARGUMENT, "`dram`", () -> session.setFallback(engine));

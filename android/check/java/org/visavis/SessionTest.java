@@ -175,6 +175,14 @@ final class SessionTest {
         }
     }
 
+    static void testLittleSoundAhead() throws Exception {
+        try (VisavisEngine engine = engine();
+                VisavisSession session = engine.newSession(new SessionOptions().voiceAhead(0.5))) {
+            session.pushUserAudio(new float[24_000], 0, 24_000, 24_000);
+            equal(12_000L, session.stats().userVoice.overflowSamples);
+        }
+    }
+
     static void testThreadsForPerformanceHints() throws Exception {
         try (VisavisEngine engine = engine();
                 VisavisSession one = engine.newSession();

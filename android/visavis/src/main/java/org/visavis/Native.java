@@ -40,7 +40,7 @@ final class Native {
 
     static native long sessionNew(long engine, long seed, int threads, long coreMask, String sampler, float gaze, float guidance,
             float gazeGuidance, float temperature, double x, double z, double yaw, boolean stance, boolean guard,
-            float budget);
+            float budget, double voiceAhead);
 
     static native boolean sessionClose(long session);
 

@@ -62,7 +62,7 @@ public final class SessionStats {
     public static final class Voice {
         /** Silence in place of sound that had not come, while the voice was present. */
         public final long underrunSamples;
-        /** Dropped because a minute of sound was waiting already. */
+        /** Dropped because so much sound was waiting already, a minute by default. */
         public final long overflowSamples;
         /** Clipped to 8 times full scale, input samples: a sign of integers pushed as floats. */
         public final long clippedSamples;

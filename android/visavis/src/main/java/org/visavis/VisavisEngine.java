@@ -74,7 +74,7 @@ public final class VisavisEngine implements AutoCloseable {
     public VisavisSession newSession(@NonNull SessionOptions options) {
         long session = Native.sessionNew(handle, options.seed, options.threads, options.coreMask, options.sampler.name, options.gaze,
                 options.guidance, options.gazeGuidance, options.temperature, options.startX, options.startZ, options.startYaw,
-                options.stance, options.guard, options.budget);
+                options.stance, options.guard, options.budget, options.voiceAhead);
         return new VisavisSession(session, skeleton);
     }
 

@@ -34,7 +34,8 @@ public final class VisavisSession implements AutoCloseable {
     }
 
     /**
-     * Appends to the agent's own voice: mono samples, full scale 1, up to a minute ahead of time (more is dropped and counted).
+     * Appends to the agent's own voice: mono samples, full scale 1, up to a minute ahead of time
+     * ({@link SessionOptions#voiceAhead}; more is dropped and counted).
      * Sound that has not come when a block is computed is silence there, is counted, and is heard later.
      *
      * @param rate samples a second, 8000 to 192000
