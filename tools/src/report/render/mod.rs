@@ -159,10 +159,7 @@ fn machines(report: &Report, d: &mut Document) {
         ]);
     }
     let (a, b) = (format!("mm here ({})", here.arch), format!("there ({})", other.arch));
-    d.table(
-        &["bundle", maker(report), &a, &b, "difference", "p99 here", "there", "difference", "bits"],
-        rows,
-    );
+    d.table(&["bundle", maker(report), &a, &b, "difference", "p99 here", "there", "difference", "bits"], rows);
 }
 
 /// Blocks of the same candidate and sampler on both machines: there, its name, here.
