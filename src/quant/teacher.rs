@@ -126,7 +126,7 @@ impl Teacher {
     /// guidance, temperature).
     pub fn compare(&self, candidate: &Arc<Engine>) -> Result<Forced> {
         let (a, b) = (self.engine.config(), candidate.config());
-        if (&a.rig, a.vae, a.flow, &a.audio) != (&b.rig, b.vae, b.flow, &b.audio) {
+        if (&a.rig, a.vae, a.flow, &a.audio, &a.hearing) != (&b.rig, b.vae, b.flow, &b.audio, &b.hearing) {
             return Err(argument("the candidate is not made from the reference: rig or sizes differ".to_owned()));
         }
         if (&a.session, &a.gaze) != (&b.session, &b.gaze) {

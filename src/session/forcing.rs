@@ -77,5 +77,7 @@ impl Session {
             tools.exec.end();
         }
         state.motion.clone_from(&block.motion);
+        // What is heard is heard at the head that was shown.
+        state.frames.clone_from(&block.frames);
     }
 }

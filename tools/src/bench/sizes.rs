@@ -93,6 +93,7 @@ impl Size {
             flow,
             dram: None,
             mospa: None,
+            hearing: None,
             student: Some(StudentConfig { tau_history: 0.9, guidance: 2.0, gaze_guidance: 1.5 }),
             session: SessionConfig {
                 guidance: 1.3,
