@@ -24,7 +24,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         let (angle, radius) = (2.399_963 * i as f64, 2.5 + 0.35 * (i as f64).sqrt());
         let (x, z) = (radius * angle.sin(), radius * angle.cos());
         let start = Root { x, z, yaw: (-x).atan2(-z) };
-        engine.session(SessionOptions { seed: i as u64, gaze: Some(0.9), start, ..SessionOptions::default() })
+        // Sound comes as it is heard: half a second of it is room enough.
+        let options = SessionOptions { seed: i as u64, gaze: Some(0.9), start, voice_ahead: 0.5, ..Default::default() };
+        engine.session(options)
     };
     let mut crowd: Vec<Session> = (0..agents).map(session).collect::<Result<_, _>>()?;
 

@@ -206,6 +206,31 @@ fn a_minute_is_kept() {
     assert_eq!(session.stats().inputs.agent_voice.underrun_samples, 0);
 }
 
+/// Half a second is enough for sound that is pushed as it is heard, and changes no bit; what is more
+/// is dropped and counted; less, or more than a minute, is refused.
+#[test]
+fn a_session_may_keep_less() {
+    let inputs = inputs(24_000);
+    let whole = run(&mut session(), &inputs, BLOCKS);
+    let small = |voice_ahead| tiny().session(SessionOptions { voice_ahead, ..options() });
+    let mut session = small(0.5).unwrap();
+    inputs.path.iter().for_each(|(time, position)| session.push_user_head(*position, *time).unwrap());
+    let mut frames = Vec::new();
+    for block in 0..BLOCKS {
+        let sound = 3200 * block..3200 * (block + 1);
+        session.push_agent_audio(&inputs.agent[sound.clone()], 24_000).unwrap();
+        session.push_user_audio(&inputs.user[sound], 24_000).unwrap();
+        frames.extend(poll_blocks(&mut session, 1));
+    }
+    assert_eq!(frames, whole);
+    assert_eq!(session.stats().inputs.user_voice.overflow_samples, 0);
+    session.push_agent_audio(&[0.05; 24_000], 24_000).unwrap();
+    assert_eq!(session.stats().inputs.agent_voice.overflow_samples, 12_000);
+    for seconds in [0.0, 0.49, 60.1, -1.0, f64::NAN, f64::INFINITY] {
+        assert_eq!(small(seconds).unwrap_err().kind(), ErrorKind::Argument, "{seconds}");
+    }
+}
+
 /// Positions come by two ways, one of them late: what no block has used is put in order, the rest
 /// is counted.
 #[test]

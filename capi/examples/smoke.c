@@ -1,4 +1,5 @@
-/* Every function of visavis.h, used as a program would and as it should not. Arguments: the bundle. Exit code 0 when all is well. */
+/* Every function of visavis.h, used as a program would and as it should not. Arguments: the bundle, beside which
+ * dram-tcn.safetensors lies. Exit code 0 when all is well. */
 #include "check.h"
 #include <fcntl.h>
 #include <inttypes.h>
@@ -84,6 +85,20 @@ static void options_and_versions(const visavis_engine *engine) {
     OK(visavis_session_options_init(&options, sizeof options));
     options.budget_ms = 1000;
     REFUSED(ARGUMENT, visavis_session_new(engine, &options, &session));
+    OK(visavis_session_options_init(&options, sizeof options));
+    CHECK(options.voice_ahead == 60);
+    options.voice_ahead = 0.4;
+    REFUSED(ARGUMENT, visavis_session_new(engine, &options, &session));
+    options.voice_ahead = NAN;
+    REFUSED(ARGUMENT, visavis_session_new(engine, &options, &session));
+    options.voice_ahead = 0.5;
+    OK(visavis_session_new(engine, &options, &session));
+    float second[8000] = {0};
+    visavis_stats stats = {.struct_size = sizeof stats};
+    OK(visavis_session_push_agent_audio(session, second, 8000, 8000));
+    OK(visavis_session_stats(session, &stats));
+    CHECK(stats.agent_voice.overflow_samples > 11000 && stats.agent_voice.overflow_samples < 12100);
+    visavis_session_free(session);
     OK(visavis_session_options_init(&options, sizeof options));
     options.sampler_kind = 77;
     REFUSED(ARGUMENT, visavis_session_new(engine, &options, &session));
@@ -196,6 +211,50 @@ static uint64_t drive(const visavis_engine *engine, uint32_t threads, int blocks
     return digest;
 }
 
+/* Blocks that come late are left to a bundle of the featherweight tier, which lies beside the first one. */
+static void fallback(const visavis_engine *engine, const char *path) {
+    char beside[4096];
+    const char *slash = strrchr(path, '/');
+    snprintf(beside, sizeof beside, "%.*sdram-tcn.safetensors", slash ? (int)(slash + 1 - path) : 0, path);
+    visavis_engine *light = NULL;
+    visavis_session *session = NULL, *other = NULL;
+    OK(visavis_engine_from_path(beside, &light));
+    visavis_session_options options;
+    OK(visavis_session_options_init(&options, sizeof options));
+    options.budget_ms = 100;
+    OK(visavis_session_new(engine, &options, &session));
+    OK(visavis_session_new(light, NULL, &other));
+    REFUSED(ARGUMENT, visavis_session_set_fallback(session, engine));
+    REFUSED(ARGUMENT, visavis_session_set_fallback(session, NULL));
+    REFUSED(ARGUMENT, visavis_session_set_fallback(NULL, light));
+    REFUSED(ARGUMENT, visavis_session_set_fallback(other, light));
+    visavis_session_free(other);
+    OK(visavis_session_set_fallback(session, light));
+    visavis_engine_free(light);
+
+    size_t all = VISAVIS_BLOCK_FRAMES * visavis_engine_joint_count(engine), told;
+    float *shares = malloc(all * sizeof *shares);
+    visavis_frame frames[VISAVIS_BLOCK_FRAMES];
+    uint64_t fell = 0;
+    for (int k = 0; k < 60; k++) {
+        double due;
+        uint32_t count;
+        OK(visavis_session_next_due(session, &due));
+        OK(visavis_session_poll(session, due, frames, sizeof *frames, NULL, 0, &count));
+        OK(visavis_session_dyadic(session, shares, all, &told));
+        CHECK(count == VISAVIS_BLOCK_FRAMES && (told == 0 || told == all));
+        if (told) CHECK(shares[0] >= 0 && shares[all - 1] <= 1);
+        if (told) REFUSED(ARGUMENT, visavis_session_dyadic(session, shares, all - 1, &told));
+        fell += told > 0;
+        OK(visavis_session_report_block_time(session, told ? 5 : 99999));
+    }
+    visavis_stats stats = {.struct_size = sizeof stats};
+    OK(visavis_session_stats(session, &stats));
+    CHECK(fell > 0 && stats.governor_fallback_blocks == fell && stats.governor_held_blocks == 0);
+    free(shares);
+    visavis_session_free(session);
+}
+
 static const visavis_engine *shared;
 static visavis_session *contested;
 
@@ -232,6 +291,7 @@ int main(int argc, char **argv) {
     visavis_engine *engine = NULL;
     OK(visavis_engine_from_path(argv[1], &engine));
     options_and_versions(engine);
+    fallback(engine, argv[1]);
 
     CHECK(strlen(visavis_engine_name(engine)) > 0 && strcmp(visavis_engine_joint_name(engine, 0), "hips") == 0);
     CHECK(visavis_engine_joint_name(engine, 1000) == NULL && visavis_engine_joint_count(NULL) == 0);

@@ -16,11 +16,11 @@
  *
  * THREADS
  *  - An engine may be used by any number of threads at once, and so may the inputs and settings of a session: the functions push, finish,
- *    clear, set and report. They never wait for a block or for another thread, and never return VISAVIS_STATUS_BUSY, whatever the others
+ *    clear, set (but set_fallback) and report. They never wait for a block or for another thread, and never return VISAVIS_STATUS_BUSY, whatever the others
  *    do. A block goes by what came before its poll began: the same inputs give the same motion, whichever threads they come from. A
  *    voice is one stream: one thread pushes its sound, while commands may come from others. After the first push of a voice, or
  *    of another rate, pushing does not allocate.
- *  - All other functions of a session, poll, reset and stats among them, are one thread's at a time, though not always the same one's: such
+ *  - All other functions of a session, poll, reset, set_fallback and stats among them, are one thread's at a time, though not always the same one's: such
  *    a call while another one is under way returns VISAVIS_STATUS_BUSY and does nothing. Freeing is the last call of all.
  *
  * ERRORS
@@ -48,8 +48,8 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-// Version of this interface, 1.1: major number in the upper 16 bits, minor in the lower.
-#define VISAVIS_ABI_VERSION ((1 << 16) | 1)
+// Version of this interface, 1.2: major number in the upper 16 bits, minor in the lower.
+#define VISAVIS_ABI_VERSION ((1 << 16) | 2)
 
 // Frames that a poll gives when a block is due.
 #define VISAVIS_BLOCK_FRAMES 4
@@ -320,6 +320,9 @@ typedef struct visavis_stats {
     uint64_t user_bad_rate_samples;
     // See agent_contended_samples.
     uint64_t user_contended_samples;
+    // Since interface 1.2. Blocks that the fallback made instead of a pose being held
+    // (visavis_session_set_fallback).
+    uint64_t governor_fallback_blocks;
 } visavis_stats;
 
 #ifdef __cplusplus
@@ -451,6 +454,14 @@ visavis_status visavis_session_set_sampler(struct visavis_session *session, int3
 // chooses the sampler of each block, the session's at best. 0 pins the session's sampler.
 visavis_status visavis_session_set_budget(struct visavis_session *session, float milliseconds);
 
+// Gives a session with a budget an engine of the kind `dram`, of the same rig and delays, to step
+// down to: where blocks of even the cheapest sampler come late three times in a row, that engine
+// makes the motion, instead of a pose being held, through a cross-fade both ways.
+// visavis_session_dyadic tells of its frames, governor_fallback_blocks counts its blocks. Takes
+// memory; a reset keeps it; the engine may be freed afterwards. One thread's at a time, as
+// visavis_session_poll. Since interface 1.2.
+visavis_status visavis_session_set_fallback(struct visavis_session *session, const struct visavis_engine *engine);
+
 // Tells the governor how long the last block took by the caller's clock, in place of what the
 // session measured: for callers whose deadline covers more than visavis_session_poll.
 visavis_status visavis_session_report_block_time(struct visavis_session *session, double milliseconds);
@@ -473,8 +484,8 @@ visavis_status visavis_session_poll(struct visavis_session *session,
 // How much each joint follows the user rather than the agent's own voice and habit in the last
 // block's frames, 0 to 1: the read-out of bundles of the kind `dram`. `*count` becomes 4 times the
 // joint count, the shares of frame `i` starting at `shares[i * visavis_engine_joint_count]`, or 0
-// before the first block and with other bundles. `capacity` is the room in `shares`; too little is
-// refused.
+// before the first block and where another bundle made the last one. `capacity` is the room in
+// `shares`; too little is refused.
 visavis_status visavis_session_dyadic(const struct visavis_session *session,
                                       float *shares,
                                       size_t capacity,

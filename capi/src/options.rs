@@ -60,6 +60,10 @@ pub struct VisavisSessionOptions {
     pub budget_ms: f32,
     /// 0.
     pub reserved: u32,
+    /// Since interface 1.2. Seconds of sound that each voice may be ahead of the block that was
+    /// computed last, 0.5 to 60 (default); what is more is dropped and counted. A second takes 192
+    /// KB: a crowd that hears sound as it comes does with the least.
+    pub voice_ahead: f64,
     /// Of test builds.
     #[cfg(feature = "grown")]
     pub grown: u64,
@@ -87,6 +91,7 @@ impl VisavisSessionOptions {
             guard: 1,
             budget_ms: 0.0,
             reserved: 0,
+            voice_ahead: SessionOptions::default().voice_ahead,
             #[cfg(feature = "grown")]
             grown: crate::structs::GROWN,
         }
@@ -118,6 +123,7 @@ impl VisavisSessionOptions {
             stance: o.stance != 0,
             guard: o.guard != 0,
             governor: Governor::within(o.budget_ms),
+            voice_ahead: o.voice_ahead,
             ..Default::default()
         })
     }

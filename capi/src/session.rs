@@ -124,7 +124,7 @@ pub unsafe extern "C" fn visavis_session_free(session: *mut VisavisSession) {
 }
 
 /// Appends to the agent's own voice: `count` mono samples, full scale 1, of `rate` Hz (8000 to
-/// 192000), up to a minute ahead of time. More is dropped and counted. Sound that has not come when
+/// 192000), up to a minute ahead of time (voice_ahead of the options). More is dropped and counted. Sound that has not come when
 /// a block is computed is silence there, is counted, and is heard later. A voice that was never
 /// pushed is absent, which is not the same as silent. Samples that are not finite become silence,
 /// are counted, and make the status VISAVIS_STATUS_AUDIO; all others are taken. From any thread,
@@ -269,6 +269,26 @@ pub unsafe extern "C" fn visavis_session_set_budget(session: *mut VisavisSession
     unsafe { around(session, |s| Ok(s.controls().set_budget(milliseconds)?)) }
 }
 
+/// Gives a session with a budget an engine of the kind `dram`, of the same rig and delays, to step
+/// down to: where blocks of even the cheapest sampler come late three times in a row, that engine
+/// makes the motion, instead of a pose being held, through a cross-fade both ways.
+/// visavis_session_dyadic tells of its frames, governor_fallback_blocks counts its blocks. Takes
+/// memory; a reset keeps it; the engine may be freed afterwards. One thread's at a time, as
+/// visavis_session_poll. Since interface 1.2.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_set_fallback(
+    session: *mut VisavisSession,
+    engine: *const VisavisEngine,
+) -> VisavisStatus {
+    let set = |s: &mut Session| {
+        // SAFETY: the header's promise.
+        let fallback = unsafe { borrow(engine, "engine") }?;
+        Ok(s.set_fallback(&fallback.engine)?)
+    };
+    // SAFETY: the header's promise.
+    unsafe { with(session, set) }
+}
+
 /// Tells the governor how long the last block took by the caller's clock, in place of what the
 /// session measured: for callers whose deadline covers more than visavis_session_poll.
 #[unsafe(no_mangle)]
@@ -326,8 +346,8 @@ pub unsafe extern "C" fn visavis_session_poll(
 /// How much each joint follows the user rather than the agent's own voice and habit in the last
 /// block's frames, 0 to 1: the read-out of bundles of the kind `dram`. `*count` becomes 4 times the
 /// joint count, the shares of frame `i` starting at `shares[i * visavis_engine_joint_count]`, or 0
-/// before the first block and with other bundles. `capacity` is the room in `shares`; too little is
-/// refused.
+/// before the first block and where another bundle made the last one. `capacity` is the room in
+/// `shares`; too little is refused.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_session_dyadic(
     session: *const VisavisSession,

@@ -11,7 +11,7 @@ use visavis::stats::{SessionStats, VoiceStats};
 pub struct VisavisVoiceStats {
     /// Silence in place of sound that had not come, while the voice was present.
     pub underrun_samples: u64,
-    /// Dropped because a minute of sound was waiting already.
+    /// Dropped because so much sound was waiting already, a minute by default.
     pub overflow_samples: u64,
     /// Clipped to 8 times full scale, input samples: a sign of integers pushed as floats.
     pub clipped_samples: u64,
@@ -87,6 +87,9 @@ pub struct VisavisStats {
     pub user_bad_rate_samples: u64,
     /// See agent_contended_samples.
     pub user_contended_samples: u64,
+    /// Since interface 1.2. Blocks that the fallback made instead of a pose being held
+    /// (visavis_session_set_fallback).
+    pub governor_fallback_blocks: u64,
     /// Of test builds.
     #[cfg(feature = "grown")]
     pub grown: u64,
@@ -142,6 +145,7 @@ impl From<SessionStats> for VisavisStats {
             user_non_finite_samples: s.inputs.user_voice.non_finite_samples,
             user_bad_rate_samples: s.inputs.user_voice.bad_rate_samples,
             user_contended_samples: s.inputs.user_voice.contended_samples,
+            governor_fallback_blocks: s.governor.fallback_blocks,
             #[cfg(feature = "grown")]
             grown: crate::structs::GROWN,
         }

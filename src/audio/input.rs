@@ -88,8 +88,8 @@ impl VoiceInput {
     /// Appends mono `samples` (full scale 1.0) of `rate` Hz (8000 to 192000) and makes the voice
     /// present. An empty push changes nothing.
     ///
-    /// Up to a minute is kept ahead of the block that was computed last; what is more is dropped
-    /// and counted. Samples that are not finite are silence, those beyond 8 times full scale are
+    /// Up to a minute is kept ahead of the block that was computed last, or what the session's
+    /// options say; what is more is dropped and counted. Samples that are not finite are silence, those beyond 8 times full scale are
     /// clipped; both are counted.
     ///
     /// On a change of rate the old resampler's last samples come first, as if silence followed,

@@ -9,7 +9,7 @@ use std::sync::atomic::Ordering::{Acquire, Release};
 
 #[test]
 fn bad_samples_are_silence_and_loud_ones_clipped() {
-    let mut voice = Voice::with_capacity(1);
+    let mut voice = Voice::with_capacity(1.0);
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let e = voice.input().push(&[0.1, bad, 0.2], 24_000).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::Audio);
@@ -25,7 +25,7 @@ fn bad_samples_are_silence_and_loud_ones_clipped() {
 
 #[test]
 fn what_is_broken_off_is_room_at_once() {
-    let mut voice = Voice::with_capacity(1);
+    let mut voice = Voice::with_capacity(1.0);
     voice.input().push(&noise(1, 24_000), 24_000).unwrap();
     let first = block(&mut voice, 0).1;
     assert_eq!(first, noise(1, 24_000)[..3_200]);
@@ -52,7 +52,7 @@ fn numbered(i: usize) -> f32 {
 #[test]
 fn a_voice_in_three_threads() {
     const PUSHES: usize = 4_000;
-    let mut voice = Voice::with_capacity(1);
+    let mut voice = Voice::with_capacity(1.0);
     let (pushing, commanding) = (voice.input().clone(), voice.input().clone());
     let done = AtomicUsize::new(0);
     let mut k = 0;
@@ -106,7 +106,7 @@ fn a_voice_in_three_threads() {
 #[test]
 fn what_meets_another_thread_is_heard_or_counted() {
     const SAMPLES: usize = 20_000;
-    let mut voice = Voice::with_capacity(4);
+    let mut voice = Voice::with_capacity(4.0);
     std::thread::scope(|scope| {
         for sign in [-1.0, 1.0] {
             let input = voice.input().clone();
@@ -130,7 +130,7 @@ fn what_meets_another_thread_is_heard_or_counted() {
 /// counted; commands still find room, and stand in their places between the sound.
 #[test]
 fn what_waits_for_another_thread_is_in_order() {
-    let mut voice = Voice::with_capacity(8);
+    let mut voice = Voice::with_capacity(8.0);
     let input = voice.input().clone();
     let feed = input.shared.feed.lock().unwrap();
     let kept = INBOX - COMMANDS;

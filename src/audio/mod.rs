@@ -3,7 +3,7 @@
 //! ```text
 //! push: f32 ──> VoiceInput ───────────> Voice ─────────────────> AudioEncoder ──> features
 //! any size,     resampler; a ring of    3200 samples per block,  on our kernels,  D_a per
-//! rate, thread  a minute at 24 kHz      on the session's time    or TractEncoder  frame
+//! rate, thread  24 kHz                  on the session's time    or TractEncoder  frame
 //! ```
 //!
 //! And, for whole clips at a desk (`internals` alone): what two ears hear of a sound somewhere

@@ -86,7 +86,7 @@ pub(super) fn block(voice: &mut Voice, index: u64) -> (bool, Vec<f32>) {
 
 #[test]
 fn absent_is_not_silent_and_late_sound_follows_after_silence() {
-    let mut voice = Voice::with_capacity(1);
+    let mut voice = Voice::with_capacity(1.0);
     assert_eq!(block(&mut voice, 0), (false, vec![0.0; 3200]));
     assert_eq!(voice.stats().underrun_samples, 0);
     voice.input().push(&[], 24_000).unwrap();
@@ -110,7 +110,7 @@ fn absent_is_not_silent_and_late_sound_follows_after_silence() {
 
 #[test]
 fn too_much_is_dropped_and_counted() {
-    let mut voice = Voice::with_capacity(1);
+    let mut voice = Voice::with_capacity(1.0);
     let input = noise(5, 30_000);
     voice.input().push(&input, 24_000).unwrap();
     assert_eq!(voice.stats().overflow_samples, 6_000);
@@ -127,7 +127,7 @@ fn too_much_is_dropped_and_counted() {
 
 #[test]
 fn a_change_of_rate_leaves_no_gap() {
-    let mut voice = Voice::with_capacity(4);
+    let mut voice = Voice::with_capacity(4.0);
     let mut hear = Vec::new();
     for rate in [48_000, 24_000, 16_000, 44_100] {
         voice.input().push(&sine(500.0, rate, rate as usize / 2), rate).unwrap();
@@ -186,9 +186,9 @@ proptest! {
     ) {
         // Block k may be taken as soon as its own time has been pushed.
         let input = noise(9, 2 * rate as usize);
-        let mut at_once = Voice::with_capacity(2);
+        let mut at_once = Voice::with_capacity(2.0);
         at_once.input().push(&input, rate).unwrap();
-        let mut live = Voice::with_capacity(2);
+        let mut live = Voice::with_capacity(2.0);
         let mut pushed = 0;
         for (k, ahead) in ahead.iter().enumerate() {
             let until = ((k + 1) * rate as usize * 4).div_ceil(30) + ahead * rate as usize / 24_000;

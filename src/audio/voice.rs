@@ -8,7 +8,7 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{BLOCK_SAMPLES, SAMPLE_RATE};
 
 /// Seconds of sound that a [`Voice::new`] holds ahead of the block that was taken last (5.8 MB).
-pub const VOICE_SECONDS: u32 = 60;
+pub const VOICE_SECONDS: f64 = 60.0;
 /// Samples beyond this are clipped: 18 dB over full scale, far from any voice and far from
 /// overflow.
 const CLIP: f32 = 8.0;
@@ -40,10 +40,11 @@ impl Voice {
         Self::with_capacity(VOICE_SECONDS)
     }
 
-    /// A voice that holds `seconds` (1 to 3600, else clamped) beyond the block that was taken last.
-    pub fn with_capacity(seconds: u32) -> Self {
-        let stream = Stream::new(seconds.clamp(1, 3600) as usize * SAMPLE_RATE as usize, CLIP, INBOX);
-        Self { stream, start: 0, underrun: 0 }
+    /// A voice that holds `seconds` (0.5 to 3600, else clamped) beyond the block that was taken
+    /// last.
+    pub fn with_capacity(seconds: f64) -> Self {
+        let samples = (seconds.clamp(0.5, 3600.0) * f64::from(SAMPLE_RATE)) as usize;
+        Self { stream: Stream::new(samples, CLIP, INBOX), start: 0, underrun: 0 }
     }
 
     /// The end that is pushed into.

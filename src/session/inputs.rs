@@ -106,7 +106,7 @@ pub(super) struct Inputs {
 impl EncodedVoice {
     fn new(engine: &Engine, options: &SessionOptions, delay: u32) -> Result<Self> {
         Ok(Self {
-            voice: Voice::new(),
+            voice: Voice::with_capacity(options.voice_ahead),
             encoder: Encoder::new(engine, options.diagnostics.audio)?,
             samples: Box::new([0.0; BLOCK_SAMPLES]),
             features: vec![0.0; BLOCK_FRAMES * engine.config.audio.features],

@@ -165,7 +165,8 @@ impl Session {
     /// Appends to a voice: mono samples, full scale 1, any rate from 8 to 192 kHz. The same as
     /// [`VoiceInput::push`] of [`Session::voice_input`].
     ///
-    /// The voice may come ahead of time (text-to-speech does) by up to a minute. Sound that has not
+    /// The voice may come ahead of time (text-to-speech does) by up to
+    /// [`SessionOptions::voice_ahead`]. Sound that has not
     /// come when a block is computed is silence there, is counted, and is heard later. A voice that
     /// has never been pushed is absent, which is not the same as silent.
     ///

@@ -2,6 +2,7 @@
 
 use super::diagnostics::{Diagnostics, HistoryTime};
 use super::{Governor, argument};
+use crate::audio::VOICE_SECONDS;
 use crate::config::{CleanHistory, Config};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
@@ -49,6 +50,10 @@ pub struct SessionOptions {
     /// Whether frames that no body could show are replaced by a held pose
     /// ([`crate::stats::GuardStats`]); without it a pose that is not finite is an error.
     pub guard: bool,
+    /// Seconds of sound that each voice may be ahead of the block that was computed last, 0.5 to 60
+    /// (the default); what is more is dropped and counted. A second takes 192 KB for both: a crowd
+    /// that hears sound as it comes does with the least.
+    pub voice_ahead: f64,
     /// For measurements and tests.
     #[doc(hidden)]
     pub diagnostics: Diagnostics,
@@ -70,6 +75,7 @@ impl Default for SessionOptions {
             start: Root::default(),
             stance: true,
             guard: true,
+            voice_ahead: VOICE_SECONDS,
             diagnostics: Diagnostics::default(),
         }
     }
@@ -88,6 +94,9 @@ impl SessionOptions {
         }
         if [self.start.x, self.start.z, self.start.yaw].iter().any(|v| !v.is_finite() || v.abs() > 1e6) {
             return Err(argument("start: x, z and yaw must be finite and within a million metres"));
+        }
+        if !(0.5..=VOICE_SECONDS).contains(&self.voice_ahead) {
+            return Err(argument(format!("voice_ahead is {} s: 0.5 to {VOICE_SECONDS}", self.voice_ahead)));
         }
         self.diagnostics.check()?;
         self.governor.check()?;

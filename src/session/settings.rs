@@ -115,8 +115,7 @@ impl Session {
     /// motion, instead of holding the pose. Both ways it is a cross-fade of eight frames. Frames
     /// that it made have [`Frame::dyadic`](crate::Frame::dyadic), the others do not;
     /// [`GovernorStats`] counts the blocks. Where it comes late too, the pose is held. Takes
-    /// memory; without a governor it changes nothing. A reset keeps it. For hosts in Rust; the
-    /// other languages do not have it.
+    /// memory; without a governor it changes nothing. A reset keeps it.
     ///
     /// # Errors
     /// [`ErrorKind::Argument`] where this session's own engine is of the kind `dram`, where

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Opens a generated viewer page in headless Chromium, with WebGL and on the 2-D canvas, wide and phone-sized, and fails unless
 # each time the page becomes ready without a JavaScript error.
-#   tests/viewer/check.sh out/demo/index.html [folder for screenshots]
+#   tests/viewer/check.sh out/demo/index.html [folder for screenshots [told | mixed]]
+# `told`: the page's frames tell whom the body follows; `mixed`: those from 10 to 20 s alone. Else none does.
 # CHROMIUM names the browser (default: chromium, then google-chrome).
 set -euo pipefail
 
@@ -9,6 +10,7 @@ page=${1:?usage: check.sh PAGE.html [SCREENSHOT_FOLDER]}
 [ -s "$page" ] || { echo "$page: no such page" >&2; exit 1; }
 url="file://$(realpath "$page")"
 shots=${2:-}
+tells=${3:-none}
 browser=${CHROMIUM:-$(command -v chromium || command -v google-chrome || true)}
 [ -n "$browser" ] || { echo "no Chromium found: install it or set CHROMIUM" >&2; exit 1; }
 scratch=$(mktemp -d)
@@ -23,11 +25,14 @@ open() { # open SIZE HASH EXTRA...: runs the browser on the page
 }
 
 status=0
-check() { # check NAME SIZE HASH RENDERER: the state the page reports about itself
-    local name=$1 size=$2 hash=$3 renderer=$4 tag
+# check NAME SIZE HASH RENDERER [WHOM]: the state the page reports about itself. WHOM: how much of the joint that is looked at follows the user, as a
+# pattern; `none` where the body is not coloured.
+check() {
+    local name=$1 size=$2 hash=$3 renderer=$4 whom=${5:-none} tag
     open "$size" "$hash" --dump-dom >"$scratch/dom" || true
     tag=$(grep -o '<html[^>]*>' "$scratch/dom" | head -1 || true)
-    if [[ $tag == *'data-state="ready"'* && $tag == *'data-errors="0"'* && $tag == *"data-renderer=\"$renderer\""* ]]; then
+    if [[ $tag == *'data-state="ready"'* && $tag == *'data-errors="0"'* && $tag == *"data-renderer=\"$renderer\""* &&
+        $tag == *data-whom=\"$whom\"* ]]; then
         echo "ok   $name"
     else
         echo "FAIL $name: ${tag:-no page}" >&2
@@ -40,11 +45,32 @@ check() { # check NAME SIZE HASH RENDERER: the state the page reports about itse
     fi
 }
 
-check webgl-wide 1440,900 't=8.5&theme=dark' webgl2
-check webgl-light 1440,900 't=13&theme=light&cam=-60,10,4' webgl2
-check webgl-phone 412,860 't=8.5&theme=dark' webgl2
-check webgl-user 1280,720 't=8.5&view=user&theme=dark&joints' webgl2
-check webgl-plays 1280,720 'play&speed=2&theme=dark' webgl2
-check canvas-wide 1440,900 't=8.5&fallback&theme=dark' canvas2d
-check canvas-phone 412,860 't=8.5&fallback&theme=light' canvas2d
+share='[01].[0-9][0-9][0-9]'
+case $tells in
+none)
+    check webgl-wide 1440,900 't=8.5&theme=dark' webgl2
+    check webgl-light 1440,900 't=13&theme=light&cam=-60,10,4' webgl2
+    check webgl-phone 412,860 't=8.5&theme=dark' webgl2
+    check webgl-user 1280,720 't=8.5&view=user&theme=dark&joints' webgl2
+    check webgl-plays 1280,720 'play&speed=2&theme=dark' webgl2
+    check canvas-wide 1440,900 't=8.5&fallback&theme=dark' canvas2d
+    check canvas-phone 412,860 't=8.5&fallback&theme=light' canvas2d
+    ;;
+told)
+    check told-wide 1440,900 't=14&theme=dark' webgl2 "$share"
+    check told-joint 1440,900 't=14&theme=light&joint=leftUpperArm' webgl2 "$share"
+    check told-off 1440,900 't=14&theme=dark&whom=0' webgl2
+    check told-phone 412,860 't=14&theme=dark&joints' webgl2 "$share"
+    check told-canvas 1440,900 't=14&theme=dark&fallback&joint=head' canvas2d "$share"
+    ;;
+mixed)
+    check mixed-before 1440,900 't=5&theme=dark&joint=head' webgl2
+    check mixed-told 1440,900 't=15&theme=dark&joint=head' webgl2 "$share"
+    check mixed-after 1440,900 't=25&theme=light&fallback' canvas2d
+    ;;
+*)
+    echo "told or mixed, not $tells" >&2
+    exit 2
+    ;;
+esac
 exit $status

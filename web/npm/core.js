@@ -145,6 +145,15 @@ class SessionCore {
     this.core.do("visavis_set_budget", this.pointer, milliseconds);
   }
 
+  /** Steps down to `engine`, of this instance, instead of holding a pose. */
+  setFallback(engine) {
+    this.core.do("visavis_set_fallback", this.pointer, engine.pointer);
+  }
+
+  reportBlockTime(milliseconds) {
+    this.core.do("visavis_report_block_time", this.pointer, milliseconds);
+  }
+
   reset() {
     this.core.do("visavis_reset", this.pointer);
   }

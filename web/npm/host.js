@@ -16,11 +16,12 @@ const now = () => performance.timeOrigin + performance.now();
 /** Serves a port (a worker's global scope, or one end of an inline pair). */
 export function serve(port) {
   const sessions = new Map();
-  let engine = null, timer = null;
+  let core = null, engine = null, light = null, timer = null;
+  const own = { load, loadFallback };
 
   port.onmessage = async ({ data: { call, op, session: id, values } }) => {
     try {
-      const value = await (op === "load" ? load(...values) : op === "session" ? open(id, ...values) : of(id)[op](...values));
+      const value = await (Object.hasOwn(own, op) ? own[op](...values) : op === "session" ? open(id, ...values) : of(id)[op](...values));
       if (call) port.postMessage({ call, value });
     } catch (error) {
       const plain = (error instanceof VisavisError ? error : new VisavisError("other", String(error?.message ?? error))).toPlain();
@@ -29,9 +30,17 @@ export function serve(port) {
   };
 
   async function load(wasm, bundle) {
-    const core = await Core.instantiate(await compile(wasm));
+    core = await Core.instantiate(await compile(wasm));
     engine = core.engine(bundle);
     return engine.facts;
+  }
+
+  /** Another bundle, for sessions to step down to; sessions keep the one that they have. */
+  function loadFallback(bundle) {
+    const loaded = core.engine(bundle);
+    light?.close();
+    light = loaded;
+    return light.facts;
   }
 
   function open(id, options, clock, origin) {
@@ -137,6 +146,15 @@ export function serve(port) {
 
     setBudget(milliseconds) {
       this.#session.setBudget(milliseconds);
+    }
+
+    setFallback() {
+      if (!light) throw new VisavisError("state", "there is no bundle to step down to: await engine.loadFallback(bundle) first");
+      this.#session.setFallback(light);
+    }
+
+    reportBlockTime(milliseconds) {
+      this.#session.reportBlockTime(milliseconds);
     }
 
     stats() {

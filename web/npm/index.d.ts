@@ -56,6 +56,11 @@ export interface Engine {
   readonly facts: EngineFacts;
   /** Starts a session; it is usable at once, `ready` tells when it runs. */
   session(options?: SessionOptions): Session;
+  /**
+   * Loads a bundle of the kind `dram`, of the same rig, into the same worker, for sessions to step down to ({@link Session.setFallback});
+   * resolves to its facts.
+   */
+  loadFallback(bundle: Source): Promise<Omit<EngineFacts, "module">>;
   /** Ends all sessions and the worker. */
   close(): void;
 }
@@ -102,6 +107,11 @@ export interface SessionOptions {
   /** Whether planted feet are kept in place, and frames that no body could show are replaced; true by default. */
   stance?: boolean;
   guard?: boolean;
+  /**
+   * Seconds of sound that each voice may be ahead of the block that was computed last, 0.5 to 60 (default); what is more is dropped and
+   * counted. A second takes 192 KB: a crowd that hears sound as it comes does with the least.
+   */
+  voiceAhead?: number;
   /** `real` (default): blocks are computed as time goes by. `manual`: by {@link Session.advance}. */
   clock?: "real" | "manual";
 }
@@ -130,7 +140,7 @@ export interface Session {
   /** Sound of the user: mono, full scale 1, `rate` 8000 to 192000 Hz. Pushed as it is heard. */
   pushUserVoice(samples: Float32Array, rate: number): void;
   /**
-   * Sound that the agent says, up to a minute ahead. Resolves to the session time at which its first sample is heard;
+   * Sound that the agent says, up to a minute ahead ({@link SessionOptions.voiceAhead}). Resolves to the session time at which its first sample is heard;
    * play it at that time plus {@link Session.delay}, and lips and hands fit.
    */
   pushAgentVoice(samples: Float32Array, rate: number): Promise<number>;
@@ -145,6 +155,13 @@ export interface Session {
   setGaze(target: number | null): void;
   setSampler(sampler: Sampler): Promise<void>;
   setBudget(milliseconds: number): Promise<void>;
+  /**
+   * With a budget: where blocks of even the cheapest sampler come late, the bundle of {@link Engine.loadFallback} makes the motion,
+   * instead of a pose being held. Its frames have {@link Frame.dyadic}; `stats().governor.fallbackBlocks` counts its blocks.
+   */
+  setFallback(): Promise<void>;
+  /** Tells how long the last block took by the page's own measure, milliseconds, in place of what was measured: the budget goes by it. */
+  reportBlockTime(milliseconds: number): Promise<void>;
 
   /** What to show at session time `time` (default: now), {@link Session.delay} behind; null before the first frame. */
   shown(time?: number): { frame: Frame; next: Frame; /** From `frame` to `next`, 0 to 1. */ fraction: number } | null;
@@ -182,7 +199,7 @@ export interface Frame {
   joints: Float32Array;
   /**
    * How much each joint follows the user rather than the agent's own voice and habit, 0 to 1, in the order of the joints: the
-   * read-out of bundles of the kind `dram`; null with others.
+   * read-out of bundles of the kind `dram`; null where another one made the frame.
    */
   dyadic: Float32Array | null;
 }
@@ -199,7 +216,7 @@ export interface SessionStats {
   agentVoice: VoiceStats;
   userVoice: VoiceStats;
   head: { accepted: number; nonFinite: number; outOfOrder: number; absurd: number; teleports: number; overwritten: number };
-  governor: { missed: number; down: number; up: number; heldBlocks: number; catchUpPasses: number };
+  governor: { missed: number; down: number; up: number; heldBlocks: number; fallbackBlocks: number; catchUpPasses: number };
   guardTrips: number;
   guardHeldFrames: number;
 }

@@ -12,7 +12,7 @@ export const Visavis = {
   /** Loads a bundle; see index.d.ts. */
   async load(options) {
     const { bundle, wasm = {}, module, worker, inline = typeof Worker !== "function", onProgress } = options ?? {};
-    if (bundle === undefined || bundle === null) throw argument("bundle: the URL or the bytes of a .safetensors file");
+    given(bundle);
     const choice = chooseModule(module);
     const source = wasm[choice] ?? { relaxed: () => new URL("./visavis-relaxed.wasm", import.meta.url), simd128: () => new URL("./visavis-simd128.wasm", import.meta.url) }[choice]();
     const [bytes, code] = await Promise.all([read(bundle, onProgress), compile(source)]);
@@ -41,9 +41,19 @@ class Engine {
     return new Session(this.#link, this.facts, ++this.#sessions, options ?? {});
   }
 
+  async loadFallback(bundle) {
+    given(bundle);
+    const bytes = await read(bundle);
+    return this.#link.ask("loadFallback", 0, [bytes], [bytes.buffer]);
+  }
+
   close() {
     this.#link.end(new VisavisError("closed", "this engine is closed: load it again"));
   }
+}
+
+function given(bundle) {
+  if (bundle === undefined || bundle === null) throw argument("bundle: the URL or the bytes of a .safetensors file");
 }
 
 function inlined() {

@@ -92,6 +92,14 @@ export class Session {
     return this.#ask("setBudget", [number("budget", milliseconds)]);
   }
 
+  setFallback() {
+    return this.#ask("setFallback", []);
+  }
+
+  reportBlockTime(milliseconds) {
+    return this.#ask("reportBlockTime", [number("a block's time", milliseconds)]);
+  }
+
   stats() {
     return this.#ask("stats", []);
   }

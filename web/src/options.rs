@@ -17,6 +17,7 @@ struct Wishes {
     start: [f64; 3],
     stance: bool,
     guard: bool,
+    voice_ahead: f64,
 }
 
 impl Default for Wishes {
@@ -32,6 +33,7 @@ impl Default for Wishes {
             start: [0.0; 3],
             stance: true,
             guard: true,
+            voice_ahead: SessionOptions::default().voice_ahead,
         }
     }
 }
@@ -51,6 +53,7 @@ pub(crate) fn parse(json: &[u8]) -> Result<SessionOptions> {
         start: Root { x, z, yaw },
         stance: wishes.stance,
         guard: wishes.guard,
+        voice_ahead: wishes.voice_ahead,
         ..SessionOptions::default()
     })
 }

@@ -154,6 +154,22 @@ pub unsafe extern "C" fn visavis_set_budget(session: *mut Conversation, millisec
     unsafe { with(session, |s| s.set_governor(visavis::Governor::within(milliseconds))) }
 }
 
+/// Gives a session with a budget an engine of the kind `dram` to step down to instead of holding its
+/// pose; the engine may be freed afterwards.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_set_fallback(session: *mut Conversation, engine: *const Engine) -> i32 {
+    // SAFETY: the chapter on ownership, twice.
+    unsafe { with(session, |s| s.set_fallback(&engine::shared(engine))) }
+}
+
+/// Tells how long the last block took by the caller's clock, milliseconds, in place of what the
+/// session measured.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_report_block_time(session: *mut Conversation, milliseconds: f64) -> i32 {
+    // SAFETY: the chapter on ownership.
+    unsafe { with(session, |s| s.report_block_time(milliseconds)) }
+}
+
 /// Starts anew, as if just made.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_reset(session: *mut Conversation) -> i32 {
@@ -206,7 +222,7 @@ pub unsafe extern "C" fn visavis_shares(session: *const Conversation) -> *const 
     unsafe { &*session }.block.shares().as_ptr()
 }
 
-/// Numbers at [`visavis_shares`]: 0 with bundles that do not tell them.
+/// Numbers at [`visavis_shares`]: 0 where a bundle made the block that does not tell them.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_shares_length(session: *const Conversation) -> usize {
     // SAFETY: the chapter on ownership.

@@ -56,6 +56,7 @@ struct Governor {
     down: u64,
     up: u64,
     held_blocks: u64,
+    fallback_blocks: u64,
     catch_up_passes: u64,
 }
 
@@ -96,6 +97,7 @@ pub(crate) fn json(s: &SessionStats) -> String {
             down: g.down,
             up: g.up,
             held_blocks: g.held_blocks,
+            fallback_blocks: g.fallback_blocks,
             catch_up_passes: g.catch_up_passes,
         },
         guard_trips: s.guard.trips,

@@ -140,6 +140,35 @@ fn motion_is_that_of_the_file_that_webassembly_is_compared_with() {
     assert_eq!(lines, std::fs::read_to_string(path).unwrap(), "left: this machine; right: the file");
 }
 
+/// Blocks that come late are left to the featherweight tier, by block times that are told.
+#[test]
+fn late_blocks_are_left_to_the_fallback() {
+    let (tiny, light) = (engine("tests/goldens/tiny.safetensors"), engine("tests/goldens/dram-tcn.safetensors"));
+    let conversation = session(tiny, r#"{"budget":100}"#).unwrap();
+    let other = session(light, "{}").unwrap();
+    // SAFETY: what is not freed is alive.
+    unsafe {
+        assert_eq!(visavis_set_fallback(conversation, tiny), 1);
+        assert!(text().contains("`dram`"), "{}", text());
+        assert_eq!(visavis_set_fallback(other, light), 1, "{}", text());
+        assert_eq!(visavis_set_fallback(conversation, light), 0, "{}", text());
+        [tiny, light].into_iter().for_each(|engine| visavis_engine_free(engine));
+        let mut fell = 0;
+        for _ in 0..60 {
+            assert_eq!(visavis_poll(conversation, visavis_next_due(conversation)), 1, "{}", text());
+            let told = visavis_shares_length(conversation) > 0;
+            fell += i32::from(told);
+            assert_eq!(visavis_report_block_time(conversation, if told { 5.0 } else { 99_999.0 }), 0);
+        }
+        visavis_stats(conversation);
+        let counted = format!(r#""heldBlocks":0,"fallbackBlocks":{fell},"#);
+        assert!(fell > 0 && text().contains(&counted), "{fell}, {}", text());
+        assert_eq!(visavis_report_block_time(conversation, -1.0), 1, "{}", text());
+        visavis_session_free(conversation);
+        visavis_session_free(other);
+    }
+}
+
 #[test]
 fn what_is_wrong_has_a_status_and_a_text() {
     let mut status = 0;
@@ -156,6 +185,7 @@ fn what_is_wrong_has_a_status_and_a_text() {
             (r#"{"colour":1}"#, "unknown field `colour`"),
             (r#"{"sampler":"best"}"#, "unknown sampler"),
             (r#"{"gaze":2}"#, "gaze target 2"),
+            (r#"{"voiceAhead":0.4}"#, "voice_ahead is 0.4"),
         ] {
             let (status, text) = session(engine, options).unwrap_err();
             assert_eq!(status, 1);

@@ -108,6 +108,39 @@ test("bundles of the kind dram see the head's rotation and tell whom the joints 
   engine.close();
 });
 
+test("late blocks are left to the fallback, whose frames tell whom the joints follow", async () => {
+  const engine = await load();
+  const light = readFileSync(new URL("tests/goldens/dram-tcn.safetensors", root));
+  const session = engine.session({ clock: "manual", budget: 100 });
+  await assert.rejects(session.setFallback(), kind("state", /loadFallback/));
+  await assert.rejects(engine.loadFallback(), kind("argument", /bundle/));
+  await assert.rejects(engine.loadFallback(light.subarray(0, 99)), kind("bundle-corrupt"));
+  await engine.loadFallback(readFileSync(new URL("tests/goldens/tiny.safetensors", root)));
+  await assert.rejects(session.setFallback(), kind("argument", /dram/));
+  const facts = await engine.loadFallback(light);
+  assert.equal(facts.kind, "dram");
+  await session.setFallback();
+  let fell = 0, told = false;
+  session.onFrames = (frames) => {
+    told = frames.every(({ dyadic }) => dyadic?.length === facts.joints.length);
+    assert.ok(told || frames.every(({ dyadic }) => dyadic === null));
+    fell += told;
+  };
+  for (let block = 0; block < 60; block++) {
+    await session.advance(4 / 30);
+    await session.reportBlockTime(told ? 5 : 99999);
+  }
+  const { blocks, governor } = await session.stats();
+  assert.equal(blocks, 60);
+  assert.ok(fell > 0);
+  assert.equal(governor.fallbackBlocks, fell);
+  assert.equal(governor.heldBlocks, 0);
+  await assert.rejects(session.reportBlockTime(-1), kind("argument"));
+  await assert.rejects(session.reportBlockTime(NaN), kind("argument"));
+  engine.close();
+  await assert.rejects(engine.loadFallback(light), kind("closed"));
+});
+
 test("in real time a block comes every 133 ms, pauses stop it", async () => {
   const engine = await load();
   const session = engine.session({ sampler: "single" });
@@ -148,6 +181,11 @@ test("what is wrong is refused with its kind, what is only odd is counted", asyn
   const engine = await load();
   await assert.rejects(engine.session({ sampler: "best" }).ready, kind("argument", /midpoint4/));
   await assert.rejects(engine.session({ colour: 1 }).ready, kind("argument", /colour/));
+  await assert.rejects(engine.session({ voiceAhead: 0.4 }).ready, kind("argument", /0\.5 to 60/));
+  const brief = engine.session({ clock: "manual", voiceAhead: 0.5 });
+  await brief.pushAgentVoice(new Float32Array(24000), 24000);
+  assert.equal((await brief.stats()).agentVoice.overflowSamples, 12000);
+  brief.close();
   assert.throws(() => engine.session({ clock: "sun" }), kind("argument"));
   assert.throws(() => engine.session({ gaze: "much" }), kind("argument"));
   const session = engine.session({ clock: "manual" });
@@ -185,7 +223,7 @@ test("any values at all: an error of ours or none, and the session goes on", asy
   const odd = [NaN, Infinity, -Infinity, 0, -0, 1e308, -1e308, 5e-324, 1.5, 2 ** 53, -1, null, undefined, "", "agent", {}, [], true, 10n, new Float32Array(3), () => 0];
   let state = 7;
   const pick = () => odd[(state = (Math.imul(state, 1664525) + 1013904223) >>> 0) % odd.length];
-  const calls = ["pushUserHead", "pushUserVoice", "pushAgentVoice", "finishVoice", "clearVoice", "setVoicePresent", "setGaze", "setSampler", "setBudget"];
+  const calls = ["pushUserHead", "pushUserVoice", "pushAgentVoice", "finishVoice", "clearVoice", "setVoicePresent", "setGaze", "setSampler", "setBudget", "setFallback", "reportBlockTime"];
   for (let i = 0; i < 3000; i++) {
     try {
       await session[calls[i % calls.length]](pick(), pick(), pick(), pick());

@@ -10,7 +10,7 @@ const ours = (error) => error instanceof VisavisError && error.kind === "argumen
 
 test("what JSON cannot hold, or turns into a default, is refused", () => {
   for (const value of [NaN, Infinity, 10n, () => 0, Symbol("gaze"), {}, new Date()]) {
-    for (const name of ["seed", "guidance", "gaze", "budget"]) assert.throws(() => open({ [name]: value }), ours, `${name} ${String(value)}`);
+    for (const name of ["seed", "guidance", "gaze", "budget", "voiceAhead"]) assert.throws(() => open({ [name]: value }), ours, `${name} ${String(value)}`);
     assert.throws(() => open({ start: [0, value, 0] }), ours);
   }
   open({ sampler: "single", gaze: null, start: [0, 1, 0.5], guard: false, seed: undefined });

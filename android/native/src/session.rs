@@ -24,7 +24,8 @@ const JOINT: usize = 11;
 
 native!("Java_org_visavis_Native_sessionNew": session_new(
     engine: jlong, seed: jlong, threads: jint, core_mask: jlong, sampler: JString, gaze: jfloat, guidance: jfloat,
-    gaze_guidance: jfloat, temperature: jfloat, x: jdouble, z: jdouble, yaw: jdouble, stance: jboolean, guard: jboolean, budget: jfloat
+    gaze_guidance: jfloat, temperature: jfloat, x: jdouble, z: jdouble, yaw: jdouble, stance: jboolean, guard: jboolean, budget: jfloat,
+    voice_ahead: jdouble
 ) -> jlong);
 native!("Java_org_visavis_Native_sessionClose": session_close(session: jlong) -> jboolean);
 native!("Java_org_visavis_Native_pushBuffer": push_buffer(session: jlong, voice: jint, buffer: java.nio.FloatBuffer, position: jint, count: jint, rate: jint));
@@ -42,6 +43,7 @@ native!("Java_org_visavis_Native_setNaturalGaze": set_natural_gaze(session: jlon
 native!("Java_org_visavis_Native_setGuidance": set_guidance(session: jlong, weight: jfloat, gaze: jfloat));
 native!("Java_org_visavis_Native_setSampler": set_sampler(session: jlong, sampler: JString));
 native!("Java_org_visavis_Native_setBudget": set_budget(session: jlong, milliseconds: jfloat));
+native!("Java_org_visavis_Native_setFallback": set_fallback(session: jlong, engine: jlong));
 native!("Java_org_visavis_Native_reportBlockTime": report_block_time(session: jlong, milliseconds: jdouble));
 native!("Java_org_visavis_Native_sampler": sampler(session: jlong) -> JString);
 native!("Java_org_visavis_Native_pollBuffer": poll_buffer(session: jlong, now: jdouble, out: java.nio.FloatBuffer, position: jint, count: jint) -> jint);
@@ -100,6 +102,7 @@ fn session_new<'l>(
     stance: jboolean,
     guard: jboolean,
     budget: jfloat,
+    voice_ahead: jdouble,
 ) -> Outcome<jlong> {
     let engine = ENGINES.get(engine)?;
     // NaN is what Java's options hold for "the bundle's".
@@ -117,6 +120,7 @@ fn session_new<'l>(
         stance,
         guard,
         governor: Governor::within(budget),
+        voice_ahead,
         ..Default::default()
     };
     Ok(SESSIONS.insert(Arc::new(SharedSession::new(engine.session(options)?))))
@@ -245,6 +249,11 @@ fn set_sampler<'l>(env: &mut Env<'l>, _: JClass<'l>, session: jlong, sampler: JS
 
 fn set_budget<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, milliseconds: jfloat) -> Outcome {
     around(session, |s| Ok(s.controls().set_budget(milliseconds)?))
+}
+
+fn set_fallback<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, engine: jlong) -> Outcome {
+    let engine = ENGINES.get(engine)?;
+    with(session, |s| Ok(s.set_fallback(&engine)?))
 }
 
 fn report_block_time<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, milliseconds: jdouble) -> Outcome {

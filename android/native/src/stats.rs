@@ -36,8 +36,8 @@ fn row(s: &SessionStats) -> Vec<f64> {
     );
     let g = s.governor;
     row.extend(
-        [g.missed, g.down, g.up, g.held_blocks, g.catch_up_passes, s.guard.trips, s.guard.held_frames]
-            .map(|n| n as f64),
+        [g.missed, g.down, g.up, g.held_blocks, g.fallback_blocks, g.catch_up_passes].map(|n| n as f64),
     );
+    row.extend([s.guard.trips, s.guard.held_frames].map(|n| n as f64));
     row
 }

@@ -11,13 +11,13 @@ namespace Visavis
     /// </remarks>
     public sealed class Engine : IDisposable
     {
-        readonly EngineHandle handle;
-
         Engine(EngineHandle handle)
         {
-            this.handle = handle;
+            Handle = handle;
             JointCount = (int)Native.visavis_engine_joint_count(handle);
         }
+
+        internal EngineHandle Handle { get; }
 
         /// <summary>Version of the library, such as "0.1.0".</summary>
         public static string Version => Errors.Text(Native.visavis_version());
@@ -49,19 +49,19 @@ namespace Visavis
         }
 
         /// <summary>Name of the model.</summary>
-        public string Name => Errors.Text(Native.visavis_engine_name(handle));
+        public string Name => Errors.Text(Native.visavis_engine_name(Handle));
 
         /// <summary>Joints of a frame, parents before children; 0 is the hips.</summary>
         public int JointCount { get; }
 
         /// <summary>VRM humanoid name of a joint, such as "leftUpperArm".</summary>
-        public string JointName(int joint) => Errors.Text(Native.visavis_engine_joint_name(handle, Number(joint)));
+        public string JointName(int joint) => Errors.Text(Native.visavis_engine_joint_name(Handle, Number(joint)));
 
         /// <summary>Parent of a joint, -1 for the hips, and its offset from there in the rest pose, session axes, metres.</summary>
         public int JointParent(int joint, out float x, out float y, out float z)
         {
             var offset = new float[3];
-            Errors.Check(Native.visavis_engine_joint(handle, Number(joint), out var parent, offset));
+            Errors.Check(Native.visavis_engine_joint(Handle, Number(joint), out var parent, offset));
             x = offset[0];
             y = offset[1];
             z = offset[2];
@@ -69,7 +69,7 @@ namespace Visavis
         }
 
         /// <summary>Joint that follows OpenXR's body joint (XR_FB_body_tracking, XR_META_body_tracking_full_body); -1 for the root and unknown numbers.</summary>
-        public int JointForOpenXr(int openXrJoint) => openXrJoint < 0 ? -1 : Native.visavis_engine_joint_for_openxr(handle, (uint)openXrJoint);
+        public int JointForOpenXr(int openXrJoint) => openXrJoint < 0 ? -1 : Native.visavis_engine_joint_for_openxr(Handle, (uint)openXrJoint);
 
         uint Number(int joint)
         {
@@ -90,11 +90,11 @@ namespace Visavis
         /// <summary>Starts a session. All its memory is taken here.</summary>
         public Session NewSession(SessionOptions options)
         {
-            var status = Native.visavis_session_new(handle, ref options, out var session);
+            var status = Native.visavis_session_new(Handle, ref options, out var session);
             Errors.Check(status);
             return new Session(session, JointCount);
         }
 
-        public void Dispose() => handle.Dispose();
+        public void Dispose() => Handle.Dispose();
     }
 }

@@ -19,7 +19,7 @@ namespace Visavis
         public BundleException(Status status, string message) : base(status, message) { }
     }
 
-    /// <summary>Another thread is inside this session: Poll, Reset, WarmUp and Stats are one thread's at a time. Never thrown by pushes and settings.</summary>
+    /// <summary>Another thread is inside this session: Poll, Reset, WarmUp, SetFallback and Statistics are one thread's at a time. Never thrown by pushes and settings.</summary>
     public sealed class BusyException : InvalidOperationException
     {
         public BusyException(string message) : base(message) { }

@@ -8,7 +8,7 @@ namespace Visavis
     {
         // visavis.dll, libvisavis.so: what package.sh puts into the plugin folders.
         const string Library = "visavis";
-        public const uint AbiVersion = 0x10001;
+        public const uint AbiVersion = 0x10002;
 
         [DllImport(Library)] public static extern uint visavis_abi_version();
         [DllImport(Library)] public static extern Status visavis_check_abi(uint abiVersion);
@@ -42,6 +42,7 @@ namespace Visavis
         [DllImport(Library)] public static extern Status visavis_session_set_guidance(SessionHandle session, float weight, float gaze);
         [DllImport(Library)] public static extern Status visavis_session_set_sampler(SessionHandle session, int kind, uint steps);
         [DllImport(Library)] public static extern Status visavis_session_set_budget(SessionHandle session, float milliseconds);
+        [DllImport(Library)] public static extern Status visavis_session_set_fallback(SessionHandle session, EngineHandle engine);
         [DllImport(Library)] public static extern Status visavis_session_report_block_time(SessionHandle session, double milliseconds);
         [DllImport(Library)] public static extern Status visavis_session_poll(SessionHandle session, double now, [Out] Frame[] frames, UIntPtr frameSize, [Out] Joint[] joints, UIntPtr jointCapacity, out uint frameCount);
         [DllImport(Library)] public static extern Status visavis_session_next_due(SessionHandle session, out double time);

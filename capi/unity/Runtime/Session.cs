@@ -6,8 +6,8 @@ namespace Visavis
     /// <summary>One conversation. Session world: metres, seconds, right-handed, Y up; times count from 0 at its start.</summary>
     /// <remarks>
     /// Pushes, commands and settings come from any thread, such as OnAudioFilterRead and a tracker's. They never wait for Poll or for each other and are never
-    /// refused; a block goes by what came before its Poll began. One thread at a time pushes the sound of a voice. Poll, Reset, WarmUp and Statistics are one
-    /// thread's at a time, else BusyException. After Dispose: ObjectDisposedException; a call under way ends first.
+    /// refused; a block goes by what came before its Poll began. One thread at a time pushes the sound of a voice. Poll, Reset, WarmUp, SetFallback and Statistics
+    /// are one thread's at a time, else BusyException. After Dispose: ObjectDisposedException; a call under way ends first.
     /// </remarks>
     public sealed class Session : IDisposable
     {
@@ -34,7 +34,7 @@ namespace Visavis
         /// <summary>Their joints: joint j of frame i is Joints[i * JointCount + j].</summary>
         public Joint[] Joints { get; }
 
-        /// <summary>Appends mono samples, full scale 1, of 8000 to 192000 Hz, up to a minute ahead of time; more is dropped and counted.</summary>
+        /// <summary>Appends mono samples, full scale 1, of 8000 to 192000 Hz, up to a minute (SessionOptions.VoiceAhead) ahead of time; more is dropped and counted.</summary>
         /// <exception cref="ArgumentException">A bad rate: nothing was taken. Samples that are not finite: silence is in their place, all others were taken.</exception>
         public void PushAudio(Speaker speaker, float[] samples, int offset, int count, int rate)
         {
@@ -93,6 +93,18 @@ namespace Visavis
         /// <summary>Milliseconds that a block may take, 1 to 133.3: a governor then chooses samplers. 0: none.</summary>
         public void SetBudget(float milliseconds) => Errors.Check(Native.visavis_session_set_budget(handle, milliseconds));
 
+        /// <summary>
+        /// Gives a session with a budget an engine of the kind `dram`, of the same rig and delays, to step down to: where blocks of even the cheapest sampler
+        /// come late, that engine makes the motion, instead of a pose being held. Dyadic tells of its frames, GovernorFallbackBlocks counts its blocks. A
+        /// reset keeps it; the engine may be disposed afterwards.
+        /// </summary>
+        /// <exception cref="ArgumentException">This session's own engine is of the kind `dram`, the other is not, or their rigs or delays differ.</exception>
+        public void SetFallback(Engine engine)
+        {
+            if (engine == null) throw new ArgumentNullException(nameof(engine));
+            Errors.Check(Native.visavis_session_set_fallback(handle, engine.Handle));
+        }
+
         /// <summary>Tells the governor a block's time as the host measured it.</summary>
         public void ReportBlockTime(double milliseconds) => Errors.Check(Native.visavis_session_report_block_time(handle, milliseconds));
 
@@ -105,7 +117,7 @@ namespace Visavis
 
         /// <summary>
         /// How much each joint of the last block's frames follows the user rather than the agent's own voice and habit, 0 to 1, into room for
-        /// Joints.Length numbers. Returns how many those are: 0 before the first block and with bundles of another kind than `dram`.
+        /// Joints.Length numbers. Returns how many those are: 0 before the first block and where a bundle of another kind than `dram` made the last.
         /// </summary>
         public int Dyadic(float[] shares)
         {

@@ -49,6 +49,7 @@ namespace Visavis
         public uint Stance, Guard;
         public float BudgetMs;
         public uint Reserved;
+        public double VoiceAhead;
     }
 
     /// <summary>One frame without its joints, session world: visavis_frame.</summary>
@@ -92,5 +93,6 @@ namespace Visavis
         public ulong GovernorMissed, GovernorDown, GovernorUp, GovernorHeldBlocks, GovernorCatchUpPasses, GuardTrips, GuardHeldFrames;
         public ulong AgentNonFiniteSamples, AgentBadRateSamples, AgentContendedSamples;
         public ulong UserNonFiniteSamples, UserBadRateSamples, UserContendedSamples;
+        public ulong GovernorFallbackBlocks;
     }
 }

@@ -53,6 +53,15 @@ namespace Visavis.Tests
             options.Threads = 3;
             Check.Throws<ArgumentException>(() => engine.NewSession(options));
             options = Engine.Options();
+            options.VoiceAhead = 0.4;
+            Check.Throws<ArgumentException>(() => engine.NewSession(options), "voice_ahead");
+            options.VoiceAhead = 0.5;
+            using (var session = engine.NewSession(options))
+            {
+                session.PushAgentAudio(new float[24000], 24000);
+                Check.That(session.Statistics().AgentVoice.OverflowSamples == 12000, "half a second fits");
+            }
+            options = Engine.Options();
             options.SamplerKind = 77;
             Check.Throws<ArgumentException>(() => engine.NewSession(options));
             options = Engine.Options();

@@ -44,8 +44,38 @@ namespace Visavis.Tests
                 Check.That(Motion == Drive(one, 4), "the same after a reset");
                 BadInput(one);
             }
+            Fallback();
             Disposal();
             Outlives();
+        }
+
+        // Late blocks are left to a bundle of the featherweight tier, beside the first one; the outcome does not depend on the machine.
+        static void Fallback()
+        {
+            var light = Engine.FromPath(System.IO.Path.Combine(System.IO.Path.GetDirectoryName(Check.Bundle), "dram-tcn.safetensors"));
+            var options = Engine.Options();
+            options.BudgetMs = 100;
+            using (Session session = Check.Tiny.NewSession(options), other = light.NewSession())
+            {
+                Check.Throws<ArgumentException>(() => session.SetFallback(Check.Tiny), "`dram`");
+                Check.Throws<ArgumentException>(() => other.SetFallback(light), "fall back");
+                Check.Throws<ArgumentNullException>(() => session.SetFallback(null));
+                session.SetFallback(light);
+                light.Dispose();
+                Check.Throws<ObjectDisposedException>(() => session.SetFallback(light));
+                var shares = new float[session.Joints.Length];
+                ulong fell = 0;
+                for (int k = 0; k < 60; k++)
+                {
+                    Check.That(session.Poll(session.NextDue()), "a block is due");
+                    int told = session.Dyadic(shares);
+                    Check.That(told == 0 || told == shares.Length, "shares of a block");
+                    if (told > 0) fell++;
+                    session.ReportBlockTime(told > 0 ? 5 : 99999);
+                }
+                var stats = session.Statistics();
+                Check.That(fell > 0 && stats.GovernorFallbackBlocks == fell && stats.GovernorHeldBlocks == 0, "the fallback made " + fell + " blocks");
+            }
         }
 
         static void BadInput(Session session)

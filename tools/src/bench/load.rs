@@ -1,6 +1,6 @@
 //! Blocks beside other work that wants the cores: with one and with two threads, in turns.
 
-use super::{Talks, WARM_UP, ms};
+use super::{BenchOptions, Talks, WARM_UP, ms};
 use crate::contents::made_with;
 use serde::Serialize;
 use std::hint::black_box;
@@ -82,7 +82,8 @@ impl UnderLoad {
         if blocks == 0 {
             return Err(Error::new(ErrorKind::Argument, "nothing to measure: at least one block"));
         }
-        let mut talks = [Talks::new(engine, sampler, 1, 1)?, Talks::new(engine, sampler, 2, 1)?];
+        let talks = |threads| Talks::new(engine, &BenchOptions { sampler, threads, ..BenchOptions::default() });
+        let mut talks = [talks(1)?, talks(2)?];
         for talks in &mut talks {
             (0..WARM_UP).try_for_each(|_| talks.block(None))?;
         }

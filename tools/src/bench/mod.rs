@@ -42,6 +42,8 @@ pub struct BenchOptions {
     pub sessions: usize,
     /// Blocks that are timed.
     pub blocks: usize,
+    /// Seconds of sound that each session's voices have room for.
+    pub voice_ahead: f64,
     /// Counts the allocations of this process so far, where the program can: those of the timed
     /// blocks are reported.
     pub allocations: Option<fn() -> u64>,
@@ -49,7 +51,8 @@ pub struct BenchOptions {
 
 impl Default for BenchOptions {
     fn default() -> Self {
-        Self { sampler: Sampler::Midpoint4, threads: 1, sessions: 1, blocks: 200, allocations: None }
+        let voice_ahead = SessionOptions::default().voice_ahead;
+        Self { sampler: Sampler::Midpoint4, threads: 1, sessions: 1, blocks: 200, voice_ahead, allocations: None }
     }
 }
 
@@ -110,13 +113,13 @@ impl Bench {
     /// # Errors
     /// Those of making a session; [`ErrorKind::Argument`] for no blocks or no sessions.
     pub fn run(engine: &Arc<Engine>, options: BenchOptions) -> Result<Self> {
-        let BenchOptions { sampler, threads, sessions, blocks, allocations } = options;
+        let BenchOptions { sampler, threads, sessions, blocks, allocations, .. } = options;
         if blocks == 0 || sessions == 0 {
             return Err(Error::new(ErrorKind::Argument, "nothing to measure: at least one block of one session"));
         }
         machine::reset_peak();
         let started = Instant::now();
-        let mut talks = Talks::new(engine, sampler, threads, sessions)?;
+        let mut talks = Talks::new(engine, &options)?;
         talks.block(None)?;
         let first_frame_ms = ms(started.elapsed());
         for _ in 0..WARM_UP {
@@ -178,7 +181,8 @@ struct Talks {
 }
 
 impl Talks {
-    fn new(engine: &Arc<Engine>, sampler: Sampler, threads: usize, sessions: usize) -> Result<Self> {
+    fn new(engine: &Arc<Engine>, options: &BenchOptions) -> Result<Self> {
+        let BenchOptions { sampler, threads, sessions, voice_ahead, .. } = *options;
         let tone = |i: usize| {
             let t = i as f32 / SAMPLE_RATE as f32;
             0.2 * (900.0 * t).sin() * (23.0 * t).sin().max(0.0)
@@ -186,8 +190,8 @@ impl Talks {
         let team = (sessions > 1).then(|| engine.team(threads)).transpose()?;
         // A team has the threads.
         let threads = if team.is_some() { 1 } else { threads };
-        let session =
-            |seed| engine.session(SessionOptions { sampler, threads, seed: seed as u64, ..SessionOptions::default() });
+        let options = |seed| SessionOptions { sampler, threads, seed, voice_ahead, ..SessionOptions::default() };
+        let session = |seed| engine.session(options(seed as u64));
         let sessions = (0..sessions).map(session).collect::<Result<_>>()?;
         Ok(Self { sessions, team, samples: (0..BLOCK_SAMPLES).map(tone).collect() })
     }

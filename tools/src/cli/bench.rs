@@ -39,6 +39,9 @@ pub struct BenchArgs {
     /// Blocks that are timed
     #[arg(long, value_name = "N", default_value = "200", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=1_000_000))]
     pub blocks: usize,
+    /// Seconds of sound that each session's voices have room for, 0.5 to 60
+    #[arg(long, value_name = "S", default_value = "60", conflicts_with = "load")]
+    pub voice_ahead: f64,
     /// Measures beside N threads that do nothing but compute, with one thread and with two in
     /// turns: these times alone. Or several numbers one after the other: 0,1,2
     #[arg(long, value_name = "N", num_args = 1.., value_delimiter = ',', value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(0..=64), conflicts_with_all = ["threads", "sessions"])]
@@ -115,7 +118,14 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     for &sampler in samplers {
         for &threads in &args.threads {
             for &sessions in &args.sessions {
-                let options = BenchOptions { sampler, threads, sessions, blocks: args.blocks, allocations };
+                let options = BenchOptions {
+                    sampler,
+                    threads,
+                    sessions,
+                    blocks: args.blocks,
+                    voice_ahead: args.voice_ahead,
+                    allocations,
+                };
                 benches.push(Bench::run(&engine, options)?);
             }
         }

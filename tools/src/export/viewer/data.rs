@@ -13,6 +13,9 @@ use visavis::{BLOCK_FRAMES, FPS, Frame, SAMPLE_RATE, Sampler};
 const STEP: f32 = 0.0002;
 /// A foot nearer to the floor than this is marked as touching it, metres.
 const TOUCH: f64 = 0.03;
+/// What stands for a share in a frame that does not tell whom its joints follow; shares are in
+/// 254ths.
+const UNTOLD: u8 = 255;
 
 /// Everything the page reads, as JSON that is safe inside a `<script>` element: no `<` in it.
 pub fn json(recording: &Recording, meta: &Meta) -> String {
@@ -80,13 +83,17 @@ fn sampler_name(sampler: Sampler) -> String {
     }
 }
 
-/// How much each joint follows the user, in 255ths, or null where that is not told.
+/// How much each joint follows the user, a byte each, or null where no frame tells.
 fn dyadic(frames: &[Frame], joints: usize) -> Value {
-    if frames.is_empty() || frames.iter().any(|frame| frame.dyadic.len() != joints) {
+    let tells = |frame: &Frame| joints > 0 && frame.dyadic.len() == joints;
+    if !frames.iter().any(tells) {
         return Value::Null;
     }
-    let shares = frames.iter().flat_map(|frame| frame.dyadic.iter().map(|share| (share * 255.0).round() as u8));
-    base64(&shares.collect::<Vec<_>>()).into()
+    let mut shares = vec![UNTOLD; frames.len() * joints];
+    for (to, frame) in shares.chunks_exact_mut(joints).zip(frames).filter(|(_, frame)| tells(frame)) {
+        to.iter_mut().zip(&frame.dyadic).for_each(|(to, share)| *to = (share * 254.0).round() as u8);
+    }
+    base64(&shares).into()
 }
 
 /// Local rotations as 16-bit fractions; a joint the frame lacks is unrotated.
@@ -236,7 +243,9 @@ mod tests {
         assert_eq!(i16s(&loud["heard"]), [0; 120]);
         let mut told = r.clone();
         told.frames.iter_mut().for_each(|frame| frame.dyadic = vec![0.0, 1.0]);
-        assert_eq!(unbase64(parsed(&told, &Meta::default())["dyadic"].as_str().unwrap()), [0, 255, 0, 255, 0, 255]);
+        assert_eq!(unbase64(parsed(&told, &Meta::default())["dyadic"].as_str().unwrap()), [0, 254, 0, 254, 0, 254]);
+        told.frames[1].dyadic.clear();
+        assert_eq!(unbase64(parsed(&told, &Meta::default())["dyadic"].as_str().unwrap()), [0, 254, 255, 255, 0, 254]);
         let user = f32s(&v["user"]);
         assert!(user[0].is_nan());
         assert_eq!(user[3..6], [0.1, 1.6, 2.0]);

@@ -7,7 +7,8 @@
 //! after `#` in its address, joined by `&`, make views repeatable: `t=12.3` (seconds), `play`,
 //! `speed=0.5`, `cam=yaw,pitch,distance[,height]` (degrees, degrees, metres, metres; yaw 0 stands
 //! on the +Z side, where a session's agent looks), `view=user`, `follow=0`, `loop=0`,
-//! `theme=dark|light`, `joints`, `clean` (no panels), `fallback` (2-D canvas).
+//! `theme=dark|light`, `joints`, `clean` (no panels), `fallback` (2-D canvas); where the recording
+//! tells whom the body follows, `whom=0` (not coloured), `joint=NAME` (its share, and its curve).
 
 mod data;
 
@@ -35,7 +36,7 @@ pub struct Meta {
 const PAGE: &str = include_str!("page/viewer.html");
 const STYLE: &str = include_str!("page/viewer.css");
 /// Scripts in the order in which they are joined into one function scope.
-const SCRIPTS: [&str; 17] = [
+const SCRIPTS: [&str; 18] = [
     include_str!("stage/math.js"),
     include_str!("stage/shapes.js"),
     include_str!("stage/pose.js"),
@@ -50,6 +51,7 @@ const SCRIPTS: [&str; 17] = [
     include_str!("page/trail.js"),
     include_str!("page/camera.js"),
     include_str!("page/audio.js"),
+    include_str!("page/whom.js"),
     include_str!("page/timeline.js"),
     include_str!("page/hud.js"),
     include_str!("page/main.js"),

@@ -9,7 +9,7 @@ import java.nio.ByteOrder;
 import java.nio.FloatBuffer;
 
 /**
- * Runs the tests: every static method whose name starts with "test" of the classes below, in order. Arguments: the tiny bundle, the number
+ * Runs the tests: every static method whose name starts with "test" of the classes below, in order. Arguments: the tiny bundle, beside which dram-tcn.safetensors lies, the number
  * of open-and-close cycles, and the number of blocks of a digest. Prints "digest NAME HEX" lines, for comparison between machines.
  */
 public final class Check {
@@ -54,6 +54,11 @@ public final class Check {
 
     static VisavisEngine engine() throws IOException {
         return VisavisEngine.fromFile(bundle);
+    }
+
+    /** One of the featherweight tier, which lies beside the first. */
+    static VisavisEngine light() throws IOException {
+        return VisavisEngine.fromFile(new File(bundle.getParentFile(), "dram-tcn.safetensors"));
     }
 
     static FloatBuffer direct(int floats) {

@@ -64,8 +64,16 @@ final class ErrorTest {
             throwsWith(ARGUMENT, "temperature", () -> engine.newSession(new SessionOptions().temperature(3)));
             throwsWith(ARGUMENT, "not a number", () -> new SessionOptions().gaze(Float.NaN));
             throwsWith(ARGUMENT, "budget", () -> engine.newSession(new SessionOptions().budget(1000)));
+            throwsWith(ARGUMENT, "voice_ahead", () -> engine.newSession(new SessionOptions().voiceAhead(0.4)));
+            throwsWith(ARGUMENT, "voice_ahead", () -> engine.newSession(new SessionOptions().voiceAhead(Double.NaN)));
             throwsWith(ARGUMENT, "budget", () -> session.setBudget(0.5f));
             throwsWith(ARGUMENT, "block time", () -> session.reportBlockTime(-1));
+            throwsWith(ARGUMENT, "`dram`", () -> session.setFallback(engine));
+            throwsWith(NullPointerException.class, "", () -> session.setFallback(null));
+            try (VisavisEngine light = Check.light();
+                    VisavisSession other = light.newSession()) {
+                throwsWith(ARGUMENT, "fall back", () -> other.setFallback(light));
+            }
             throwsWith(ARGUMENT, "start", () -> engine.newSession(new SessionOptions().start(0, 0, Double.NaN)));
             throwsWith(ARGUMENT, "negative", () -> session.warmUp(-1));
             throwsWith(ARGUMENT, "core mask", () -> Visavis.pinCurrentThread(0));
@@ -84,6 +92,7 @@ final class ErrorTest {
         engine.close();
         throwsWith(STATE, "engine is closed", engine::newSession);
         throwsWith(STATE, "engine is closed", engine::name);
+        throwsWith(STATE, "engine is closed", () -> session.setFallback(engine));
         Check.equal(4, session.poll(0, new float[session.layout().blockFloats()], 0));
         session.close();
         session.close();

@@ -121,6 +121,30 @@ final class SessionTest {
         }
     }
 
+    /** Blocks that come late are left to the featherweight tier, by block times that are told. */
+    static void testFallback() throws Exception {
+        try (VisavisEngine engine = engine();
+                VisavisSession session = engine.newSession(new SessionOptions().budget(100))) {
+            try (VisavisEngine light = Check.light()) {
+                session.setFallback(light);
+            }
+            float[] out = new float[session.layout().blockFloats()];
+            float[] shares = new float[FrameLayout.FRAMES * engine.skeleton().size()];
+            long fell = 0;
+            for (int k = 0; k < 60; k++) {
+                equal(4, session.poll(session.nextDueNanos(), out, 0));
+                int told = session.dyadic(shares, 0);
+                isTrue(told == 0 || told == shares.length && shares[0] >= 0 && shares[told - 1] <= 1, "shares of a block");
+                fell += told > 0 ? 1 : 0;
+                session.reportBlockTime(told > 0 ? 5 : 99_999);
+            }
+            SessionStats stats = session.stats();
+            isTrue(fell > 0, "the fallback makes blocks");
+            equal(fell, stats.governorFallbackBlocks);
+            equal(0L, stats.governorHeldBlocks);
+        }
+    }
+
     static void testTooMuchAndTooLittleSound() throws Exception {
         try (VisavisEngine engine = engine();
                 VisavisSession session = engine.newSession()) {
@@ -148,6 +172,14 @@ final class SessionTest {
             session.setAgentAudioPresent(false);
             session.setUserAudioPresent(true);
             equal(4, session.poll(session.nextDueNanos(), out, 0));
+        }
+    }
+
+    static void testLittleSoundAhead() throws Exception {
+        try (VisavisEngine engine = engine();
+                VisavisSession session = engine.newSession(new SessionOptions().voiceAhead(0.5))) {
+            session.pushUserAudio(new float[24_000], 0, 24_000, 24_000);
+            equal(12_000L, session.stats().userVoice.overflowSamples);
         }
     }
 

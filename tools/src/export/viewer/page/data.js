@@ -22,8 +22,8 @@ function loadRecording() {
   for (const name of ["root", "hips", "fit", "gaze", "user"]) d[name] = floats(d[name]);
   for (const name of ["local", "decoded"]) d[name] = shorts(d[name]);
   for (const name of ["sampler", "touch"]) d[name] = bytes(d[name]);
-  d.dyadic = d.dyadic === null ? null : bytes(d.dyadic);
   for (const name of ["agentVoice", "userVoice", "heard"]) d[name] = d[name] === null ? null : shorts(d[name]);
+  d.dyadic = d.dyadic === null ? null : sharesOf(bytes(d.dyadic), d.joints.length);
   d.index = new Map(d.joints.map((joint, j) => [joint.name, j]));
   d.duration = d.frames / d.fps;
   // Rest positions of the joints: offsets summed from the hips down.
@@ -33,6 +33,10 @@ function loadRecording() {
   return d;
 }
 
+// How much each joint follows the user in each frame, 0 to 1; null for a frame that does not tell.
+const sharesOf = (told, joints) => Array.from({ length: told.length / joints }, (_, i) =>
+  told[i * joints] === 255 ? null : Float32Array.from(told.subarray(i * joints, (i + 1) * joints), (share) => share / 254));
+
 // The frames about a time, as stage/pose.js takes them, and how far it is from the first to the second.
 function framesAt(d, time) {
   const n = d.joints.length, exact = clamp(time * d.fps, 0, d.frames - 1), i = Math.floor(exact + 1e-6);
@@ -41,6 +45,7 @@ function framesAt(d, time) {
     hips: d.hips.subarray(3 * k, 3 * k + 3),
     local: d.local.subarray(4 * n * k, 4 * n * (k + 1)),
     gaze: d.gaze[k],
+    dyadic: d.dyadic?.[k] ?? null,
     user: Number.isNaN(d.user[3 * k]) ? null : [...d.user.subarray(3 * k, 3 * k + 3)],
   });
   return { i, from: frame(i), to: frame(Math.min(i + 1, d.frames - 1)), share: Math.max(0, exact - i) };

@@ -19,8 +19,7 @@ function createHud(d) {
   if (d.gazeTarget !== null) $("mark").style.left = `${100 * clamp(d.gazeTarget, 0, 1)}%`;
   for (const who of ["agent", "user"]) $(`speaks-${who}`).hidden = !d.speech[who];
   // A generator that tells whom the joints follow has no samplers, and its poses are on the rig.
-  $("row-follows").hidden = !d.dyadic;
-  $("row-fit").hidden = d.dyadic !== null;
+  $("row-fit").hidden = d.dyadic?.every((shares) => shares) ?? false;
   if (d.dyadic) set("made-with", "Generator");
 
   return {
@@ -39,11 +38,7 @@ function createHud(d) {
         flag(`speaks-${who}`, level > 0.06);
         $(`speaks-${who}`).style.setProperty("--level", clamp(levels[i], 0, 1).toFixed(2));
       }
-      if (d.dyadic) {
-        const joints = d.dyadic.subarray(i * d.joints.length, (i + 1) * d.joints.length);
-        set("follows", `${Math.round((100 * joints.reduce((a, b) => a + b, 0)) / (255 * joints.length))} %`);
-      }
-      set("sampler", d.dyadic ? "dram" : d.samplers[d.sampler[i]] ?? "–");
+      set("sampler", d.dyadic?.[i] ? "dram" : d.samplers[d.sampler[i]] ?? "–");
       flag("foot-left", (d.touch[i] & 1) > 0);
       flag("foot-right", (d.touch[i] & 2) > 0);
       set("fit", d.frames ? `${(1000 * d.fit[i]).toFixed(1)} mm` : "–");

@@ -32,7 +32,8 @@ function start() {
   const camera = createCamera(d, canvas);
   const face = createFace(d, shapes);
   const renderer = (options.has("fallback") ? null : createWebgl(canvas, d, shapes)) ?? createCanvas2d(canvas, d, shapes);
-  const timeline = createTimeline($("lanes"), d, seek);
+  const whom = createWhom(d, canvas, redraw);
+  const timeline = createTimeline($("lanes"), d, whom, seek);
   page.dataset.renderer = renderer.name;
   camera.changed = redraw;
 
@@ -80,6 +81,7 @@ function start() {
     follow: () => press("follow", (camera.follow = !camera.follow)),
     view: () => press("view", (camera.fromUser = !camera.fromUser)),
     joints: () => press("joints", (state.joints = !state.joints)),
+    whom: () => press("whom", (whom.on = d.dyadic !== null && !whom.on)),
     theme: () => { page.dataset.theme = theme() === "dark" ? "light" : "dark"; },
     clean: () => page.toggleAttribute("data-clean"),
     home: () => { camera.home(); sync(); },
@@ -104,7 +106,7 @@ function start() {
     ArrowUp: () => seek(state.time + 5), ArrowDown: () => seek(state.time - 5), Home: () => seek(0), End: () => seek(last),
     "[": () => stepSpeed(-1), "]": () => stepSpeed(1), a: () => camera.orbit(-0.1, 0), d: () => camera.orbit(0.1, 0),
     w: () => camera.orbit(0, 0.07), s: () => camera.orbit(0, -0.07), "+": () => camera.zoom(0.9), "=": () => camera.zoom(0.9), "-": () => camera.zoom(1.11),
-    l: switches.loop, m: switches.mute, f: switches.follow, v: switches.view, j: switches.joints, t: switches.theme, h: switches.clean, r: switches.home, "?": switches.help,
+    l: switches.loop, m: switches.mute, f: switches.follow, v: switches.view, j: switches.joints, c: switches.whom, t: switches.theme, h: switches.clean, r: switches.home, "?": switches.help,
   };
   window.addEventListener("keydown", (event) => {
     const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
@@ -135,6 +137,7 @@ function start() {
       const { i, from, to, share } = framesAt(d, state.time);
       pose.set(from, to, share);
       pose.frame = i;
+      if (!whom.on) pose.dyadic = null;
       face.update(pose, state.time, d.speech.agent?.[i] ?? 0, state.playing ? state.time - shown : 0);
       shown = state.time;
     }
@@ -148,7 +151,10 @@ function start() {
       fromUser, trail: trailLines(d, pieces, pose.frame), colour: timeColour(pose.frame / d.frames), joints: state.joints ? decodedAt(d, pose.frame) : null,
     }) : [];
     renderer.draw({ pose, views: [view], lines, fromUser, joints: state.joints, theme: theme() });
-    hud.draw(state.time, pose, fromUser || clean ? null : view, w, h);
+    const labelled = fromUser || clean ? null : view;
+    hud.draw(state.time, pose, labelled, w, h);
+    whom.draw(pose, labelled, w, h);
+    page.dataset.whom = pose.dyadic ? pose.dyadic[whom.joint ?? 0].toFixed(3) : "none";
     timeline.draw(state.time, theme());
     page.dataset.drawn = Number(page.dataset.drawn || 0) + 1;
   }
@@ -170,6 +176,8 @@ function start() {
   if (options.get("follow") === "0") camera.follow = false;
   if (options.get("loop") === "0") switches.loop();
   if (options.has("joints")) switches.joints();
+  if (options.get("whom") === "0" && whom.on) switches.whom();
+  if (d.dyadic && d.index.has(options.get("joint"))) whom.choose(d.index.get(options.get("joint")));
   if (options.has("clean")) switches.clean();
   if (options.has("help")) switches.help();
   setSpeed(number("speed", 1));

@@ -1,6 +1,6 @@
 // The lanes at the foot of the page: both voices or what is heard, gaze, whom the body follows where that is told, and the play head. Click or drag to seek.
 
-function createTimeline(canvas, d, onSeek) {
+function createTimeline(canvas, d, whom, onSeek) {
   const g = canvas.getContext("2d");
   const lanes = [
     { name: "Agent", kind: "voice", samples: d.agentVoice, colour: "--agent" },
@@ -9,6 +9,7 @@ function createTimeline(canvas, d, onSeek) {
   ];
   if (d.sounds) lanes.splice(0, 2, { name: "Heard", kind: "voice", samples: d.heard, colour: "--user" });
   if (d.dyadic) lanes.push({ name: "Dyadic", kind: "dyadic" });
+  canvas.dataset.lanes = lanes.length;
   const still = document.createElement("canvas");
   let key = "";
   const margin = (ratio) => 46 * ratio;
@@ -40,7 +41,7 @@ function createTimeline(canvas, d, onSeek) {
       s.fillStyle = variable("--line");
       s.fillRect(left, Math.round(middle), wide, 1);
       if (lane.kind === "gaze") return gaze(s, left, wide, middle, half, ratio, variable);
-      if (lane.kind === "dyadic") return dyadic(s, left, wide, middle, half, ratio);
+      if (lane.kind === "dyadic") return dyadic(s, left, wide, middle, half, ratio, variable);
       if (!lane.samples) {
         s.fillStyle = variable("--dim");
         return s.fillText("no voice", left + 8 * ratio, middle - 7 * ratio);
@@ -78,21 +79,34 @@ function createTimeline(canvas, d, onSeek) {
     }
   }
 
-  // How much the body follows the user: mean and largest share of the joints.
-  function dyadic(s, left, wide, middle, half, ratio) {
-    const n = d.joints.length, every = Math.max(1, Math.floor(d.frames / wide));
+  // From 0 to the largest share of all, in tenths.
+  const top = d.dyadic ? Math.max(0.1, Math.ceil(10 * d.dyadic.reduce((most, all) => Math.max(most, ...(all ?? [])), 0)) / 10) : 1;
+  // How much the body follows the user: largest share of the joints and mean, or mean and the joint that is looked at. Frames that
+  // do not tell are a gap.
+  function dyadic(s, left, wide, middle, half, ratio, variable) {
+    const every = Math.max(1, Math.floor(d.frames / wide)), joint = whom.joint;
+    const mean = (all) => all.reduce((a, b) => a + b, 0) / all.length;
+    const curves = joint === null
+      ? [[(all) => Math.max(...all), (share) => css(dyadicColour(share), 0.35)], [mean, (share) => css(dyadicColour(share))]]
+      : [[mean, (share) => css(dyadicColour(share), 0.5)], [(all) => all[joint], () => variable("--ink")]];
     s.lineWidth = 1.75 * ratio;
-    for (const [of, alpha] of [[(all) => Math.max(...all), 0.35], [(all) => all.reduce((a, b) => a + b, 0) / n, 1]]) {
-      const share = (i) => of(d.dyadic.subarray(i * n, (i + 1) * n)) / 255;
+    for (const [of, colour] of curves) {
+      const share = (i) => (d.dyadic[i] ? of(d.dyadic[i]) / top : NaN);
       for (let i = 0; i + every < d.frames; i += every) {
         const [a, b] = [share(i), share(i + every)];
-        s.strokeStyle = css(dyadicColour(0.5 * (a + b)), alpha);
+        if (Number.isNaN(a) || Number.isNaN(b)) continue;
+        s.strokeStyle = colour(0.5 * top * (a + b));
         s.beginPath();
         s.moveTo(left + (wide * i) / d.frames, middle + half - 2 * half * a);
         s.lineTo(left + (wide * (i + every)) / d.frames, middle + half - 2 * half * b);
         s.stroke();
       }
     }
+    s.fillStyle = variable(joint === null ? "--dim" : "--ink");
+    s.textAlign = "right";
+    const of = joint === null ? "mean and largest" : whom.name(joint);
+    s.fillText(`${of}, to ${Math.round(100 * top)} %`, left + wide, middle - half + 2 * ratio);
+    s.textAlign = "left";
   }
 
   const timeAt = (event) => {
@@ -110,7 +124,7 @@ function createTimeline(canvas, d, onSeek) {
       if (canvas.width !== w) canvas.width = w;
       if (canvas.height !== h) canvas.height = h;
       const style = getComputedStyle(canvas);
-      if (key !== (key = `${w} ${h} ${theme}`)) paint(w, h, ratio, style);
+      if (key !== (key = `${w} ${h} ${theme} ${whom.joint}`)) paint(w, h, ratio, style);
       const head = margin(ratio) + ((w - margin(ratio)) * time) / Math.max(d.duration, 1e-6);
       g.clearRect(0, 0, w, h);
       g.globalAlpha = 0.36;

@@ -54,6 +54,12 @@ function createCanvas2d(canvas, d, shapes) {
     return y < waist ? look.clothes[1] : look.clothes[0];
   }
 
+  // The same, blended with the colour of whom the shape's bone follows, as strongly as in WebGL.
+  function whomOf(shape, look, shares) {
+    const colour = colourOf(shape, look), strength = shape.tint === TINT.skin ? WHOM.skin : shape.tint ? 0 : WHOM.body;
+    return shares ? lerp(colour, dyadicColour(shares[shape.bone]).map((x) => x * x), strength) : colour;
+  }
+
   // Outline of two discs and what lies between, lit from the upper left.
   function cone(a, b, ra, rb, colour) {
     const angle = Math.atan2(b.y - a.y, b.x - a.x), gap = Math.hypot(b.x - a.x, b.y - a.y);
@@ -90,7 +96,7 @@ function createCanvas2d(canvas, d, shapes) {
       const thin = s.s[0] > 1 ? s.s[0] ** 0.5 : 1;
       // Discs cannot be cut: hair is moved away from the face instead.
       const [p, q] = [s.a, s.b].map((x) => (s.cut ? add(x, scale(s.cut, -0.2 * s.ra)) : x));
-      push(scene.pose.carry(s.bone, p), scene.pose.carry(s.bone, q), s.ra / thin, s.rb / thin, colourOf(s, look));
+      push(scene.pose.carry(s.bone, p), scene.pose.carry(s.bone, q), s.ra / thin, s.rb / thin, whomOf(s, look, scene.pose.dyadic));
     }
     const { user, eyes } = scene.pose;
     if (user && !scene.fromUser) {

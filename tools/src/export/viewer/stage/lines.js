@@ -24,7 +24,7 @@ function sceneLines(d, pose, options) {
     const decoded = options.joints;
     decoded.forEach((p, j) => {
       const parent = d.joints[j].parent;
-      const c = d.dyadic ? dyadicColour(d.dyadic[pose.frame * d.joints.length + j] / 255) : [1, 0.85, 0.3];
+      const c = pose.dyadic ? dyadicColour(pose.dyadic[j]) : [1, 0.85, 0.3];
       line(add(p, [0, -0.009, 0]), add(p, [0, 0.009, 0]), 0.018, [...c, 0.95]);
       if (parent !== null) line(decoded[parent], p, 0.006, [...c, 0.8]);
     });

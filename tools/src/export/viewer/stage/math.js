@@ -75,4 +75,7 @@ function dyadicColour(share) {
   return lerp([0.29, 0.56, 0.98], [0.96, 0.36, 0.60], clamp(share, 0, 1));
 }
 
+// How strongly that colour covers clothes, and skin.
+const WHOM = { body: 0.85, skin: 0.45 };
+
 const css = (c, alpha = 1) => `rgba(${c.map((x) => Math.round(255 * clamp(x, 0, 1))).join(",")},${alpha})`;

@@ -126,8 +126,8 @@ function createWebgl(canvas, d, shapes, options = {}) {
     // Squared: the colours are those of screens, light is reckoned linearly.
     const linear = (c, strength) => [...c.map((x) => x * x), scene.pose.dyadic ? strength : 0];
     if (scene.pose.dyadic) gl.uniform1fv(body.place("uShares"), scene.pose.dyadic);
-    gl.uniform4fv(body.place("uOwn"), linear(dyadicColour(0), 0.85));
-    gl.uniform4fv(body.place("uFollows"), linear(dyadicColour(1), 0.45));
+    gl.uniform4fv(body.place("uOwn"), linear(dyadicColour(0), WHOM.body));
+    gl.uniform4fv(body.place("uFollows"), linear(dyadicColour(1), WHOM.skin));
     if (!scene.bodiless) drawMesh(person, scene.pose.skin, 1);
     const { user, eyes } = scene.pose;
     if (!user || scene.fromUser) return;

@@ -40,7 +40,7 @@ final class Native {
 
     static native long sessionNew(long engine, long seed, int threads, long coreMask, String sampler, float gaze, float guidance,
             float gazeGuidance, float temperature, double x, double z, double yaw, boolean stance, boolean guard,
-            float budget);
+            float budget, double voiceAhead);
 
     static native boolean sessionClose(long session);
 
@@ -69,6 +69,8 @@ final class Native {
     static native void setSampler(long session, String sampler);
 
     static native void setBudget(long session, float milliseconds);
+
+    static native void setFallback(long session, long engine);
 
     static native void reportBlockTime(long session, double milliseconds);
 

@@ -18,6 +18,7 @@ public final class SessionOptions {
     boolean stance = true;
     boolean guard = true;
     float budget;
+    double voiceAhead = 60;
 
     /** Same seed and same inputs: same motion, bit for bit. Default 0. */
     @NonNull
@@ -99,6 +100,16 @@ public final class SessionOptions {
     @NonNull
     public SessionOptions budget(float milliseconds) {
         this.budget = checked("budget", milliseconds);
+        return this;
+    }
+
+    /**
+     * Seconds of sound that each voice may be ahead of the block that was computed last, 0.5 to 60 (default); what is more is dropped and counted. A
+     * second takes 192 KB: a crowd that hears sound as it comes does with the least.
+     */
+    @NonNull
+    public SessionOptions voiceAhead(double seconds) {
+        voiceAhead = seconds;
         return this;
     }
 

@@ -41,7 +41,7 @@ public final class SessionStats {
     /** Dropped to make room before they were asked for. */
     public final long headOverwritten;
 
-    /** Blocks that took longer than the budget; this and the next four are 0 without a budget. */
+    /** Blocks that took longer than the budget; this and the next five are 0 without a budget. */
     public final long governorMissed;
     /** Changes to a cheaper sampler. */
     public final long governorDown;
@@ -49,6 +49,8 @@ public final class SessionStats {
     public final long governorUp;
     /** Blocks whose motion was held because even the cheapest sampler took too long. */
     public final long governorHeldBlocks;
+    /** Blocks that the fallback made instead of a pose being held ({@link VisavisSession#setFallback}). */
+    public final long governorFallbackBlocks;
     /** Passes spent on bringing skipped flow times up to date. */
     public final long governorCatchUpPasses;
     /** Times that the plausibility guard took over. */
@@ -60,7 +62,7 @@ public final class SessionStats {
     public static final class Voice {
         /** Silence in place of sound that had not come, while the voice was present. */
         public final long underrunSamples;
-        /** Dropped because a minute of sound was waiting already. */
+        /** Dropped because so much sound was waiting already, a minute by default. */
         public final long overflowSamples;
         /** Clipped to 8 times full scale, input samples: a sign of integers pushed as floats. */
         public final long clippedSamples;
@@ -122,6 +124,7 @@ public final class SessionStats {
         governorDown = row.count();
         governorUp = row.count();
         governorHeldBlocks = row.count();
+        governorFallbackBlocks = row.count();
         governorCatchUpPasses = row.count();
         guardTrips = row.count();
         guardHeldFrames = row.count();

@@ -74,7 +74,7 @@ public final class VisavisEngine implements AutoCloseable {
     public VisavisSession newSession(@NonNull SessionOptions options) {
         long session = Native.sessionNew(handle, options.seed, options.threads, options.coreMask, options.sampler.name, options.gaze,
                 options.guidance, options.gazeGuidance, options.temperature, options.startX, options.startZ, options.startYaw,
-                options.stance, options.guard, options.budget);
+                options.stance, options.guard, options.budget, options.voiceAhead);
         return new VisavisSession(session, skeleton);
     }
 
@@ -99,6 +99,10 @@ public final class VisavisEngine implements AutoCloseable {
     @NonNull
     public Skeleton skeleton() {
         return skeleton;
+    }
+
+    long handle() {
+        return handle;
     }
 
     /** Lets go of the bundle. Sessions live on. Closing twice does nothing. */

@@ -7,7 +7,8 @@ import java.nio.FloatBuffer;
 /**
  * One conversation with one user.
  *
- * <p>Any thread may call. Pushes, commands to a voice, and settings (the methods push, finish, clear, set and report) never wait, neither for a
+ * <p>Any thread may call. Pushes, commands to a voice, and settings (the methods push, finish, clear, set and report, but for
+ * setFallback) never wait, neither for a
  * block that another thread computes nor for each other; a block goes by what came before its poll began, and the same inputs give the same
  * motion, whichever threads they come from. A voice is one stream: one thread pushes its sound, while commands may come from others. All
  * other calls take turns, and so may wait for a block's time.
@@ -33,7 +34,8 @@ public final class VisavisSession implements AutoCloseable {
     }
 
     /**
-     * Appends to the agent's own voice: mono samples, full scale 1, up to a minute ahead of time (more is dropped and counted).
+     * Appends to the agent's own voice: mono samples, full scale 1, up to a minute ahead of time
+     * ({@link SessionOptions#voiceAhead}; more is dropped and counted).
      * Sound that has not come when a block is computed is silence there, is counted, and is heard later.
      *
      * @param rate samples a second, 8000 to 192000
@@ -111,7 +113,7 @@ public final class VisavisSession implements AutoCloseable {
      * Writes how much each joint follows the user rather than the agent's own voice and habit in the last block's frames, 0 to 1, frame by frame,
      * joints as in the rig: the read-out of bundles of the kind {@code dram}.
      *
-     * @return numbers written: 4 times the number of joints, or 0 before the first block and with other bundles
+     * @return numbers written: 4 times the number of joints, or 0 before the first block and where another bundle made the last one
      * @throws IllegalArgumentException when there is not that much room
      */
     public int dyadic(@NonNull float[] out, int offset) {
@@ -154,6 +156,19 @@ public final class VisavisSession implements AutoCloseable {
      */
     public void setBudget(float milliseconds) {
         Native.setBudget(handle, milliseconds);
+    }
+
+    /**
+     * Gives a session with a budget an engine of the kind {@code dram}, of the same rig and delays, to step down to: where blocks of even the
+     * cheapest sampler come late, that engine makes the motion, instead of a pose being held, through a cross-fade both ways. {@link #dyadic} tells of
+     * its frames, {@link SessionStats#governorFallbackBlocks} counts its blocks. A reset keeps it; the engine may be closed afterwards. Takes its turn,
+     * as {@link #poll} does.
+     *
+     * @throws IllegalArgumentException when this session's own engine is of the kind {@code dram}, the other is not, or their rigs or delays differ
+     * @throws IllegalStateException when this session or that engine is closed
+     */
+    public void setFallback(@NonNull VisavisEngine engine) {
+        Native.setFallback(handle, engine.handle());
     }
 
     /**
