@@ -76,6 +76,10 @@ pub struct RunArgs {
 pub struct DemoArgs {
     #[command(flatten)]
     pub run: RunArgs,
+    /// A dog, a crash behind the agent and music interrupt; needs a bundle with hearing [default:
+    /// models/visavis-room-i8.safetensors]
+    #[arg(long)]
+    pub sounds: bool,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/demo")]
     pub out: PathBuf,

@@ -22,7 +22,11 @@ pub fn run(args: &GenerateArgs) -> Result<()> {
 
 /// Loads the model, runs the conversation, writes `out` and reports.
 pub fn generate(args: &RunArgs, talk: &Conversation, title: &str, subtitle: &str, out: OutputFolder) -> Result<()> {
-    let engine = Engine::load(files::model(args.model.as_deref())?)?;
+    let model = files::model(args.model.as_deref())?;
+    let engine = Engine::load(&model)?;
+    if !talk.sounds().is_empty() {
+        files::hears(&engine, &model)?;
+    }
     let mut session = engine.session(args.options())?;
     let mut line = ProgressLine::new();
     let outcome = offline::run(&mut session, talk, &mut |progress| line.show(progress))?;
