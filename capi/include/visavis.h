@@ -203,6 +203,10 @@ typedef struct visavis_session_options {
     float budget_ms;
     // 0.
     uint32_t reserved;
+    // Since interface 1.2. Seconds of sound that each voice may be ahead of the block that was
+    // computed last, 0.5 to 60 (default); what is more is dropped and counted. A second takes 192
+    // KB: a crowd that hears sound as it comes does with the least.
+    double voice_ahead;
     // Since interface 1.3. How much the agent minds sounds in the room: -1 dull, 0 (default)
     // neutral, 1 sensitive, numbers between and up to 1.5 either way.
     float sensitivity;
