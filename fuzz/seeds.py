@@ -6,7 +6,8 @@ import struct
 
 here = pathlib.Path(__file__).resolve().parent
 corpus = here / "corpus"
-tiny = (here.parent / "tests/goldens/tiny.safetensors").read_bytes()
+goldens = here.parent / "tests/goldens"
+tiny = (goldens / "tiny.safetensors").read_bytes()
 
 
 def seed(target, name, data):
@@ -44,12 +45,23 @@ seed("csv", "spreadsheet", "\ufefft,x,y,z\r\n0,1,1.6,-2\r\n\r\n5e-1,2,1.5,0\r\n"
 seed("csv", "wrong", b"t,x,y,z\n0,nan,1e400,2\n-1,,0,inf\n")
 
 header = 8 + struct.unpack("<Q", tiny[:8])[0]
-# A whole one, the small bundle, the target writes itself.
+# A whole one, the small bundle, the target writes itself; those of the featherweight tier are small enough.
 seed("bundle_bytes", "header", tiny[:header])
+for backbone in ["tcn", "lstm"]:
+    seed("bundle_bytes", f"dram-{backbone}", (goldens / f"dram-{backbone}.safetensors").read_bytes())
 seed("bundle_bytes", "length", b"\xff" * 8 + b"{}")
 seed("bundle_bytes", "empty-container", struct.pack("<Q", 2) + b"{}")
 
 for target in ["bundle_lies", "session", "capi"]:
     for i in range(8):
         seed(target, f"bytes-{i}", bytes((j * (7 + 2 * i) + i) % 256 for j in range(64 * (i + 1))))
+# The first byte chooses the bundle (fuzz_targets): both backbones, kept and with options of their own, and a session that falls back.
+steps = bytes((j * 11 + 3) % 256 for j in range(192))
+for name, first in [("tcn", 1 * 4 + 2), ("lstm", 3)]:
+    seed("bundle_lies", f"dram-{name}", bytes([first]) + steps[:63])
+for name, first in [("tcn", 50), ("lstm", 80), ("tcn-own", 34), ("lstm-own", 35), ("fallback", 100)]:
+    seed("session", f"dram-{name}", bytes([first]) + steps)
+# Late blocks one after the other: Due is step 5, Late step 11, of 18; arbitrary scales a 32-bit number.
+step = lambda i: struct.pack("<I", (i * 2**32 + 2**31) // 18)
+seed("session", "falls-back", bytes([100]) + b"".join(step(5) + step(11) + b"\1" for _ in range(8)) + bytes(8))
 print(f"seeds in {corpus}")

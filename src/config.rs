@@ -262,6 +262,21 @@ pub struct SessionConfig {
     pub anchor_radius: f32,
 }
 
+impl SessionConfig {
+    /// Of a generator without noise, guidance or anything to encode anew.
+    fn plain(bridge: f32) -> Self {
+        Self {
+            guidance: 1.0,
+            gaze_guidance: 1.0,
+            temperature: 1.0,
+            clean_history: None,
+            bridge,
+            anchor_period: 0,
+            anchor_radius: 1.0,
+        }
+    }
+}
+
 /// What the gaze channel does to a model's gaze.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GazeConfig {

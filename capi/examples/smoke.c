@@ -317,7 +317,7 @@ static void fallback(const visavis_engine *engine, const char *path) {
     OK(visavis_session_set_fallback(session, light));
     visavis_engine_free(light);
 
-    size_t all = VISAVIS_BLOCK_FRAMES * visavis_engine_joint_count(engine), told;
+    size_t all = VISAVIS_BLOCK_FRAMES * visavis_engine_joint_count(engine), told, none;
     float *shares = malloc(all * sizeof *shares);
     visavis_frame frames[VISAVIS_BLOCK_FRAMES];
     uint64_t fell = 0;
@@ -329,7 +329,7 @@ static void fallback(const visavis_engine *engine, const char *path) {
         OK(visavis_session_dyadic(session, shares, all, &told));
         CHECK(count == VISAVIS_BLOCK_FRAMES && (told == 0 || told == all));
         if (told) CHECK(shares[0] >= 0 && shares[all - 1] <= 1);
-        if (told) REFUSED(ARGUMENT, visavis_session_dyadic(session, shares, all - 1, &told));
+        if (told) REFUSED(ARGUMENT, visavis_session_dyadic(session, shares, all - 1, &none));
         fell += told > 0;
         OK(visavis_session_report_block_time(session, told ? 5 : 99999));
     }

@@ -255,7 +255,7 @@ typedef struct visavis_joint {
 typedef struct visavis_voice_stats {
     // Silence in place of sound that had not come, while the voice was present.
     uint64_t underrun_samples;
-    // Dropped because a minute of sound was waiting already.
+    // Dropped because so much sound was waiting already, a minute by default.
     uint64_t overflow_samples;
     // Clipped to 8 times full scale, input samples: a sign of integers pushed as floats.
     uint64_t clipped_samples;
@@ -425,7 +425,7 @@ visavis_status visavis_session_new(const struct visavis_engine *engine,
 void visavis_session_free(struct visavis_session *session);
 
 // Appends to the agent's own voice: `count` mono samples, full scale 1, of `rate` Hz (8000 to
-// 192000), up to a minute ahead of time. More is dropped and counted. Sound that has not come when
+// 192000), up to a minute ahead of time (voice_ahead of the options). More is dropped and counted. Sound that has not come when
 // a block is computed is silence there, is counted, and is heard later. A voice that was never
 // pushed is absent, which is not the same as silent. Samples that are not finite become silence,
 // are counted, and make the status VISAVIS_STATUS_AUDIO; all others are taken. From any thread,

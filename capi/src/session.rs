@@ -7,7 +7,7 @@ use crate::options::{VisavisSessionOptions, sampler};
 use crate::status::{Failure, Outcome, VisavisStatus, guard};
 use crate::structs::{borrow, place, room, slice};
 use std::sync::TryLockError;
-use visavis::glam::{Quat, Vec3};
+use visavis::glam::Vec3;
 use visavis::{Session, SharedSession, Speaker, VoiceInput};
 
 /// One conversation with one user.
@@ -216,7 +216,7 @@ pub unsafe extern "C" fn visavis_session_push_user_pose(
     time: f64,
 ) -> VisavisStatus {
     let tell = |shared: &SharedSession| {
-        shared.head().push_pose(Vec3::new(x, y, z), Some(Quat::from_xyzw(qx, qy, qz, qw)), time);
+        shared.head().push_numbers([x, y, z, qx, qy, qz, qw], time);
         Ok(())
     };
     // SAFETY: the header's promise.

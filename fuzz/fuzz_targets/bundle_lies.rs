@@ -8,7 +8,7 @@ use safetensors::Dtype;
 use std::sync::OnceLock;
 use visavis::internals::bundle::CONFIG_KEY;
 use visavis::{Engine, Sampler, SessionOptions};
-use visavis_fuzz::small;
+use visavis_fuzz::kinds;
 
 /// Numbers that break things.
 const EDGES: [u64; 14] =
@@ -43,8 +43,10 @@ enum Lie {
 
 fuzz_target!(|data: &[u8]| {
     let mut u = Unstructured::new(data);
+    // Half of them about the flow model, half about the featherweight tier.
+    let kind = [0, 0, 1, 2][usize::from(u.arbitrary::<u8>().unwrap_or(0) % 4)];
     let Ok(lies) = Vec::<Lie>::arbitrary(&mut u) else { return };
-    let bytes = tell(&lies[..lies.len().min(4)]);
+    let bytes = tell(kind, &lies[..lies.len().min(4)]);
     let Ok(engine) = Engine::from_slice(&bytes, "fuzz") else { return };
     // One evaluation of one of the two networks, for every other input: most lies are found out
     // before, and loading is what they are for.
@@ -60,12 +62,12 @@ fuzz_target!(|data: &[u8]| {
     }
 });
 
-/// The sound bundle's header, without its metadata, and the data after it.
-fn sound() -> &'static (Header, Vec<u8>) {
-    static SOUND: OnceLock<(Header, Vec<u8>)> = OnceLock::new();
-    SOUND.get_or_init(|| {
+/// A sound bundle's header, without its metadata, and the data after it.
+fn sound(kind: usize) -> &'static (Header, Vec<u8>) {
+    static SOUND: [OnceLock<(Header, Vec<u8>)>; 3] = [const { OnceLock::new() }; 3];
+    SOUND[kind].get_or_init(|| {
         let (mut header, mut data) = (Header::new(), Vec::new());
-        for (name, (dtype, shape, bytes)) in &small().tensors {
+        for (name, (dtype, shape, bytes)) in &kinds()[kind].tensors {
             let offsets = [data.len(), data.len() + bytes.len()];
             data.extend_from_slice(bytes);
             let dtype = if *dtype == Dtype::F16 { "F16" } else { "F32" };
@@ -91,11 +93,11 @@ fn numbers<'a>(value: &'a mut serde_json::Value, out: &mut Vec<&'a mut serde_jso
     }
 }
 
-fn tell(lies: &[Lie]) -> Vec<u8> {
-    let names: Vec<_> = small().tensors.keys().collect();
+fn tell(kind: usize, lies: &[Lie]) -> Vec<u8> {
+    let names: Vec<_> = kinds()[kind].tensors.keys().collect();
     let name = |i: u8| names[usize::from(i) % names.len()].clone();
-    let mut config = small().config.clone();
-    let (mut header, mut data) = sound().clone();
+    let mut config = kinds()[kind].config.clone();
+    let (mut header, mut data) = sound(kind).clone();
     let (mut length, mut cut) = (None, None);
     for lie in lies {
         match lie {

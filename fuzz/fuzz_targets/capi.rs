@@ -10,11 +10,11 @@ use std::cell::Cell;
 use std::ffi::CStr;
 use std::ptr::{null, null_mut};
 use visavis_c::*;
-use visavis_fuzz::small_bundle;
+use visavis_fuzz::{DRAM, small_bundle};
 
 #[derive(Debug, Arbitrary)]
 enum Call {
-    New { options: [u8; 96], size: u8, null: bool },
+    New { options: [u8; 104], size: u8, null: bool },
     Defaults { size: u8 },
     Free,
     Sound { agent: bool, len: u16, rate: u32, value: f32, pointer: u8 },
@@ -27,6 +27,8 @@ enum Call {
     NaturalGaze,
     Guidance(f32, f32),
     Sampler(i8, u8),
+    /// An engine that is no fallback, or one of another rig.
+    Fallback { light: bool, pointer: u8 },
     Poll { now: f64, frame_size: u16, joints: u16, pointers: u8 },
     Due { pointers: u8 },
     Reset,
@@ -60,6 +62,21 @@ fn shared() -> (*mut VisavisEngine, *mut VisavisSession) {
         SHARED.set(Some((engine, session)));
         (engine, session)
     })
+}
+
+/// An engine of the featherweight tier.
+fn light() -> *mut VisavisEngine {
+    thread_local! {
+        static LIGHT: Cell<*mut VisavisEngine> = const { Cell::new(null_mut()) };
+    }
+    if LIGHT.get().is_null() {
+        let mut engine = null_mut();
+        // SAFETY: a slice, and a place for a pointer.
+        let status = unsafe { visavis_engine_from_memory(DRAM[0].as_ptr(), DRAM[0].len(), &mut engine) };
+        assert_eq!(status, VisavisStatus::Ok);
+        LIGHT.set(engine);
+    }
+    LIGHT.get()
 }
 
 fuzz_target!(|data: &[u8]| {
@@ -127,6 +144,11 @@ impl Caller {
                     bytes.copy_from(options.as_ptr(), options.len());
                     // More than what is there is not promised.
                     bytes.cast::<u32>().write(u32::from(size).min(128));
+                    // Mostly room for sound that is allowed.
+                    if options[96] % 4 > 0 {
+                        given[12] = 60f64.to_bits();
+                    }
+                    let bytes = given.as_mut_ptr().cast::<u8>();
                     // Not two threads: starting one would be all that takes time.
                     bytes.cast::<u32>().add(1).write([1, 1, 0, 3][usize::from(options[4] % 4)]);
                     let options = if null { std::ptr::null() } else { given.as_ptr().cast() };
@@ -178,6 +200,12 @@ impl Caller {
                 Call::Guidance(weight, gaze) => visavis_session_set_guidance(session, weight, gaze),
                 Call::Sampler(kind, steps) => {
                     visavis_session_set_sampler(session, i32::from(kind % 4), u32::from(steps))
+                }
+                Call::Fallback { light, pointer: how } => {
+                    let other = if light { self::light() } else { self.engine };
+                    let status = visavis_session_set_fallback(session, pointer(other, how, 0));
+                    assert_eq!(status, VisavisStatus::Argument);
+                    status
                 }
                 Call::Poll { now, frame_size, joints, pointers } => self.poll(now, frame_size, joints, pointers),
                 Call::Due { pointers } => {

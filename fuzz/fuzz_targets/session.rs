@@ -8,17 +8,19 @@ use libfuzzer_sys::fuzz_target;
 use std::cell::RefCell;
 use visavis::internals::session::{Anchoring, Diagnostics};
 use visavis::{Budget, ErrorKind, Governor, Root, Sampler, Session, SessionOptions, Speaker};
-use visavis_fuzz::{engine, student};
+use visavis_fuzz::{engine, light, student, tiny};
 
 thread_local! {
-    /// The session of most executions, of an engine with the student alone: making one takes longer
-    /// than using it, and a reset is to leave nothing behind. One execution in eight makes its own,
-    /// with both networks.
-    static KEPT: RefCell<Option<Session>> = const { RefCell::new(None) };
+    /// The sessions of most executions, by [`make`]: making one takes longer than using it, and a
+    /// reset is to leave nothing behind. Others make their own.
+    static KEPT: RefCell<[Option<Session>; 4]> = const { RefCell::new([const { None }; 4]) };
 }
 
-/// Blocks that an execution computes at most: many executions are worth more than long ones.
-const BLOCKS: u32 = 3;
+/// Blocks that an execution computes at most: many executions are worth more than long ones. With a
+/// fallback as many as it takes to get there and back.
+const BLOCKS: [u32; 2] = [3, 8];
+/// The one with a fallback.
+const FALLS_BACK: usize = 3;
 
 #[derive(Debug, Arbitrary)]
 struct Options {
@@ -31,6 +33,7 @@ struct Options {
     anchoring: u8,
     budget: Option<f32>,
     stance: bool,
+    voice_ahead: Option<f64>,
     first_block: u32,
 }
 
@@ -49,6 +52,8 @@ enum Step {
     Sampler(u8),
     Governor(Option<f32>),
     Time(f64),
+    /// The last block was late, or in time.
+    Late(bool),
     Present(bool, bool),
     Finish(bool),
     Clear(bool),
@@ -80,19 +85,40 @@ fn governor(budget: Option<f32>) -> Governor {
     budget.map_or(Governor::Off, |milliseconds| Governor::Budget(Budget { milliseconds, coarse: milliseconds > 50.0 }))
 }
 
+/// A session that is kept: of the student alone (0), of the featherweight tier (1, 2), of the
+/// student with such a fallback.
+fn make(which: usize) -> Session {
+    let engine = match which {
+        1 | 2 => light(which == 2),
+        FALLS_BACK => tiny(),
+        _ => student(),
+    };
+    let options = SessionOptions { sampler: Sampler::Single, ..SessionOptions::default() };
+    let mut session = engine.session(options).expect("a session");
+    if which == FALLS_BACK {
+        session.set_fallback(&light(false)).expect("the same rig");
+    }
+    session
+}
+
 fuzz_target!(|data: &[u8]| {
     let mut u = Unstructured::new(data);
-    if !matches!(u.arbitrary::<u8>(), Ok(0..32)) {
+    let first = u.arbitrary::<u8>().unwrap_or(u8::MAX);
+    if first >= 48 {
+        let which = match first {
+            48..72 => 1,
+            72..96 => 2,
+            96..144 => FALLS_BACK,
+            _ => 0,
+        };
         return KEPT.with_borrow_mut(|kept| {
-            let options = SessionOptions { sampler: Sampler::Single, ..SessionOptions::default() };
-            let make = || student().session(options).expect("a session");
-            let session = kept.get_or_insert_with(make);
+            let session = kept[which].get_or_insert_with(|| make(which));
             session.set_gaze(None).expect("no target");
             session.set_guidance(1.3, 2.5).expect("weights");
-            session.set_sampler(Sampler::Single).expect("a student");
-            session.set_governor(Governor::Off).expect("none");
+            session.set_sampler(Sampler::Single).expect("a student, or no samplers");
+            session.set_governor(governor((which == FALLS_BACK).then_some(60.0))).expect("none, or a budget");
             session.reset().expect("a reset");
-            drive(session, &mut u);
+            drive(session, &mut u, BLOCKS[usize::from(which == FALLS_BACK)]);
         });
     }
     let Ok(o) = Options::arbitrary(&mut u) else { return };
@@ -105,6 +131,7 @@ fuzz_target!(|data: &[u8]| {
         start: Root { x: o.start[0], z: o.start[1], yaw: o.start[2] },
         governor: governor(o.budget),
         stance: o.stance,
+        voice_ahead: o.voice_ahead.unwrap_or(0.5),
         diagnostics: Diagnostics {
             anchoring: if o.anchoring == 0 { Anchoring::Bundle } else { Anchoring::Every(u32::from(o.anchoring) - 1) },
             first_block: u64::from(o.first_block),
@@ -112,18 +139,19 @@ fuzz_target!(|data: &[u8]| {
         },
         ..SessionOptions::default()
     };
-    let mut session = match engine().session(options) {
+    let engine = if first < 32 { engine() } else { light(first % 2 == 1) };
+    let mut session = match engine.session(options) {
         Ok(session) => session,
         Err(e) => return assert_eq!(e.kind(), ErrorKind::Argument, "{e}"),
     };
-    drive(&mut session, &mut u);
+    drive(&mut session, &mut u, BLOCKS[0]);
 });
 
-/// Takes steps while there are any.
-fn drive(session: &mut Session, u: &mut Unstructured) {
+/// Takes steps while there are any, and as many blocks at most.
+fn drive(session: &mut Session, u: &mut Unstructured, most: u32) {
     let (mut next, mut blocks) = (None, 0);
     while let Ok(step) = Step::arbitrary(u) {
-        if blocks >= BLOCKS || u.is_empty() {
+        if blocks >= most || u.is_empty() {
             break;
         }
         blocks += take(session, step, &mut next);
@@ -177,6 +205,7 @@ fn take(session: &mut Session, step: Step, next: &mut Option<u64>) -> u32 {
         Step::Sampler(i) => typed(session.set_sampler(sampler(i))),
         Step::Governor(budget) => typed(session.set_governor(governor(budget))),
         Step::Time(ms) => typed(session.report_block_time(ms)),
+        Step::Late(late) => typed(session.report_block_time(if late { 1e5 } else { 1.0 })),
         Step::Present(agent, present) => {
             session.voice_input(speaker(agent)).set_present(present);
         }
@@ -207,6 +236,7 @@ fn poll(session: &mut Session, now: f64, next: &mut Option<u64>) -> u32 {
         Ok(None) => 0,
         Ok(Some(frames)) => {
             for frame in frames {
+                assert!(frame.dyadic.iter().all(|share| (0.0..=1.0).contains(share)));
                 assert!(next.is_none_or(|n| n == frame.index));
                 *next = Some(frame.index + 1);
                 assert!(frame.global.iter().all(|t| t.position.is_finite() && t.rotation.is_finite()));

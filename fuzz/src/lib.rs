@@ -1,4 +1,4 @@
-//! What the fuzz targets share: the smallest bundle that runs, and taking bundles apart.
+//! What the fuzz targets share: the smallest bundles that run, and taking bundles apart.
 
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
@@ -12,6 +12,12 @@ use visavis::{BundleFile, Engine, Networks};
 /// The bundle of the tests: the real networks with few channels and random weights.
 pub const TINY: &[u8] = include_bytes!("../../tests/goldens/tiny.safetensors");
 
+/// Those of the featherweight tier, with dilated convolutions and with LSTM; the rig is [`TINY`]'s.
+pub const DRAM: [&[u8]; 2] = [
+    include_bytes!("../../tests/goldens/dram-tcn.safetensors"),
+    include_bytes!("../../tests/goldens/dram-lstm.safetensors"),
+];
+
 /// A bundle taken apart.
 #[derive(Clone)]
 pub struct Parts {
@@ -20,11 +26,11 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// Takes [`TINY`] apart.
-    fn tiny() -> Self {
-        let (_, header) = SafeTensors::read_metadata(TINY).expect("the tiny bundle");
+    /// Takes a bundle of the tests apart.
+    fn of(bundle: &[u8]) -> Self {
+        let (_, header) = SafeTensors::read_metadata(bundle).expect("a sound bundle");
         let config = &header.metadata().as_ref().expect("metadata")[CONFIG_KEY];
-        let file = SafeTensors::deserialize(TINY).expect("the tiny bundle");
+        let file = SafeTensors::deserialize(bundle).expect("a sound bundle");
         let tensors = file.iter().map(|(n, v)| (n.to_owned(), (v.dtype(), v.shape().to_vec(), v.data().to_vec())));
         Self { config: serde_json::from_str(config).expect("a config"), tensors: tensors.collect() }
     }
@@ -62,6 +68,12 @@ pub fn small() -> &'static Parts {
     PARTS.get_or_init(make_small)
 }
 
+/// Bundles of every kind that sessions have: [`small`], and [`DRAM`].
+pub fn kinds() -> &'static [Parts; 3] {
+    static PARTS: OnceLock<[Parts; 3]> = OnceLock::new();
+    PARTS.get_or_init(|| [small().clone(), Parts::of(DRAM[0]), Parts::of(DRAM[1])])
+}
+
 /// [`small`] as a file.
 pub fn small_bundle() -> &'static [u8] {
     static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
@@ -92,8 +104,22 @@ pub fn student() -> Arc<Engine> {
     }))
 }
 
+/// The engines of [`DRAM`].
+pub fn light(lstm: bool) -> Arc<Engine> {
+    static ENGINES: [OnceLock<Arc<Engine>>; 2] = [const { OnceLock::new() }; 2];
+    let i = usize::from(lstm);
+    Arc::clone(ENGINES[i].get_or_init(|| Engine::from_slice(DRAM[i], "light").expect("the bundle loads")))
+}
+
+/// The engine of [`TINY`] with the student alone, which may step down to [`light`].
+pub fn tiny() -> Arc<Engine> {
+    let file = BundleFile::from_slice(TINY, "tiny");
+    let networks = Networks { reference: false, ..Networks::default() };
+    Engine::from_file_with(&file, Kernels::detect().expect("a level"), networks).expect("the tiny bundle loads")
+}
+
 fn make_small() -> Parts {
-    let mut parts = Parts::tiny();
+    let mut parts = Parts::of(TINY);
     let config = &mut parts.config;
     for network in ["vae", "flow"] {
         config[network]["layers"] = 1.into();

@@ -30,15 +30,20 @@ pub(super) fn config(c: &Config) -> Result<()> {
             )));
         }
     }
-    let bytes = session_bytes(c);
-    if bytes > MAX_SESSION {
-        let (mib, most) = (bytes >> 20, MAX_SESSION >> 20);
-        return Err(invalid(format!(
-            "a session of this model would take {mib} MiB, more than {most}: the config's widths, layers or windows are wrong; \
-             export the bundle again"
-        )));
+    affordable("session", session_bytes(c), "widths, layers or windows")
+}
+
+/// Checks that a `what` takes no more `bytes` than any needs; else `suspects` of the config are
+/// wrong.
+fn affordable(what: &str, bytes: u128, suspects: &str) -> Result<()> {
+    if bytes <= MAX_SESSION {
+        return Ok(());
     }
-    Ok(())
+    let (mib, most) = (bytes >> 20, MAX_SESSION >> 20);
+    Err(invalid(format!(
+        "a {what} of this model would take {mib} MiB, more than {most}: the config's {suspects} are wrong; \
+         export the bundle again"
+    )))
 }
 
 /// Checks what sessions of every kind go by.
@@ -67,14 +72,7 @@ fn mospa(m: &MospaConfig) -> Result<()> {
     }
     let tokens = 3 + 2 * m.frames / m.patch;
     let bytes = [4, tokens, m.width, 7 + m.mlp].iter().map(|n| *n as u128).product::<u128>();
-    if bytes > MAX_SESSION {
-        let (mib, most) = (bytes >> 20, MAX_SESSION >> 20);
-        return Err(invalid(format!(
-            "a clip of this model would take {mib} MiB, more than {most}: the config's frames, patch or width are wrong; \
-             export the bundle again"
-        )));
-    }
-    Ok(())
+    affordable("clip", bytes, "frames, patch or width")
 }
 
 /// Checks the networks of the kind `sarah`.

@@ -73,16 +73,7 @@ impl From<DramBundle> for Config {
     fn from(bundle: DramBundle) -> Self {
         let DramBundle { format, kind, name, description, licence, user_delay_blocks, agent_delay_blocks, .. } = bundle;
         let DramBundle { rig, audio, dram, session, quantisation, .. } = bundle;
-        // No noise, no guidance, nothing to encode anew.
-        let session = SessionConfig {
-            guidance: 1.0,
-            gaze_guidance: 1.0,
-            temperature: 1.0,
-            clean_history: None,
-            bridge: session.bridge,
-            anchor_period: 0,
-            anchor_radius: 1.0,
-        };
+        let session = SessionConfig::plain(session.bridge);
         Self {
             format,
             kind,

@@ -44,15 +44,7 @@ impl From<MospaBundle> for Config {
     fn from(bundle: MospaBundle) -> Self {
         let MospaBundle { format, kind, name, description, licence, rig, mospa, quantisation } = bundle;
         // No session goes by it.
-        let session = SessionConfig {
-            guidance: 1.0,
-            gaze_guidance: 1.0,
-            temperature: 1.0,
-            clean_history: None,
-            bridge: 0.0,
-            anchor_period: 0,
-            anchor_radius: 1.0,
-        };
+        let session = SessionConfig::plain(0.0);
         Self {
             format,
             kind,

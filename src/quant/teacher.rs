@@ -3,9 +3,10 @@
 //!
 //! The reference is a session that runs freely over a scene: what it is told, free gaze included,
 //! is what any session with these options is told. The candidate is a session too, and computes
-//! every block from the reference's past: the same latents behind it (through its own weights), the
-//! same root and posture, the same noise, the same user. So the difference is that of one block,
-//! and does not grow. Its voices go through its own audio encoder. Neither re-anchors.
+//! every block from the reference's past: the same latents behind it (through its own weights), or of
+//! the kind `dram` the same memory, the same root and posture, the same noise, the same user. So the
+//! difference is that of one block, and does not grow. Its voices go through its own audio encoder.
+//! Neither re-anchors.
 
 use super::argument;
 use super::scene::Scene;
@@ -25,8 +26,10 @@ pub struct Teacher {
     engine: Arc<Engine>,
     scene: Scene,
     options: SessionOptions,
+    /// How the reference stood before its first block, and its blocks.
+    start: MadeBlock,
     blocks: Vec<MadeBlock>,
-    /// The reference's features encoded and decoded again.
+    /// The reference's features encoded and decoded again; of the kind `dram` none.
     round_trip: Vec<Metric>,
 }
 
@@ -46,10 +49,12 @@ pub struct FrameError {
 pub struct Forced {
     /// Every frame.
     pub frames: Vec<FrameError>,
-    /// The reference's latents and the candidate's, standardised, block after block.
+    /// The reference's latents and the candidate's, standardised, block after block; of the kind
+    /// `dram` their poses.
     pub latents: [Vec<f32>; 2],
     /// The reference's decoded features encoded and decoded again, joints against those of the
-    /// reference's encoder and decoder: metres, joint after joint, frame after frame.
+    /// reference's encoder and decoder: metres, joint after joint, frame after frame; of the kind
+    /// `dram` empty.
     pub round_trip: Vec<f32>,
 }
 
@@ -92,14 +97,18 @@ impl Teacher {
             ..SessionOptions::default()
         };
         let mut session = Session::listened(Arc::clone(engine), options.clone(), activations.take())?;
+        let start = session.made();
         let mut blocks = Vec::with_capacity(scene.blocks());
         scene.play(&mut session, |session, _| {
             blocks.push(session.made());
             Ok(())
         })?;
         *activations = session.stop_listening();
-        let mut this = Self { engine: Arc::clone(engine), scene, options, blocks, round_trip: Vec::new() };
-        this.round_trip = this.through(engine, activations)?;
+        let own = Arc::clone(engine);
+        let mut this = Self { engine: own, scene, options, start, blocks, round_trip: Vec::new() };
+        if engine.sarah().is_ok() {
+            this.round_trip = this.through(engine, activations)?;
+        }
         Ok(this)
     }
 
@@ -126,7 +135,8 @@ impl Teacher {
     /// guidance, temperature).
     pub fn compare(&self, candidate: &Arc<Engine>) -> Result<Forced> {
         let (a, b) = (self.engine.config(), candidate.config());
-        if (&a.rig, a.vae, a.flow, &a.audio, &a.hearing) != (&b.rig, b.vae, b.flow, &b.audio, &b.hearing) {
+        let sizes = (&a.rig, a.vae, a.flow, &a.dram, &a.audio, &a.hearing);
+        if sizes != (&b.rig, b.vae, b.flow, &b.dram, &b.audio, &b.hearing) {
             return Err(argument("the candidate is not made from the reference: rig or sizes differ".to_owned()));
         }
         if (&a.session, &a.gaze) != (&b.session, &b.gaze) {
@@ -135,23 +145,27 @@ impl Teacher {
             return Err(argument(message.to_owned()));
         }
         let mut session = Session::listened(Arc::clone(candidate), self.options.clone(), None)?;
-        session.reset_to(self.engine.sarah()?.idle.view());
+        match self.engine.sarah() {
+            Ok(sarah) => session.reset_to(sarah.idle.view()),
+            Err(_) => session.follow(&self.start),
+        }
         let mut forced = Forced { frames: Vec::new(), latents: [Vec::new(), Vec::new()], round_trip: Vec::new() };
         self.scene.play(&mut session, |session, block| {
             let (taught, made) = (&self.blocks[block], session.made());
-            forced.latents[0].extend_from_slice(taught.z.values());
-            forced.latents[1].extend_from_slice(made.z.values());
+            forced.latents[0].extend_from_slice(taught.output());
+            forced.latents[1].extend_from_slice(made.output());
             forced.frames.extend(taught.frames.iter().zip(&made.frames).map(|(a, b)| FrameError::between(a, b)));
             session.follow(taught);
             Ok(())
         })?;
+        let Ok(sarah) = candidate.sarah() else { return Ok(forced) };
         let radius = a.pose.radius;
         let joints = |x: &[f32]| -> Vec<Vec3> {
             let (_, joints) = x.split_at(crate::frame::ROOT_CHANNELS);
             let vertices = joints.as_chunks::<{ crate::frame::JOINT_CHANNELS }>().0;
             vertices.iter().map(|v| pose::icosahedron::decode(v, radius).0).collect()
         };
-        let width = candidate.sarah()?.features();
+        let width = sarah.features();
         for (a, b) in self.round_trip.iter().zip(self.through(candidate, &mut None)?) {
             for (a, b) in a.values().chunks_exact(width).zip(b.values().chunks_exact(width)) {
                 forced.round_trip.extend(joints(a).iter().zip(joints(b)).map(|(a, b)| a.distance(b)));

@@ -75,6 +75,12 @@ impl HeadInput {
         count(dropped);
     }
 
+    /// As [`HeadInput::push_pose`] of plain numbers: x, y and z, and the rotation's x, y, z and w. For
+    /// languages that have no vectors.
+    pub fn push_numbers(&self, [x, y, z, qx, qy, qz, qw]: [f32; 7], time: f64) {
+        self.push_pose(Vec3::new(x, y, z), Some(Quat::from_xyzw(qx, qy, qz, qw)), time);
+    }
+
     /// Moves what was pushed into `track`; returns at the latest after as many samples as wait at
     /// once.
     pub(crate) fn drain(&self, track: &mut HeadTrack) {

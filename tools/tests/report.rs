@@ -6,7 +6,7 @@ mod cli;
 mod common;
 
 use cli::{Scratch, fails, names, succeeds};
-use common::tiny_f32;
+use common::{golden_path, tiny_f32};
 use visavis::internals::kernels::Scheme;
 use visavis::internals::quant::{Options, quantise};
 
@@ -85,4 +85,33 @@ fn a_quick_report_tells_everything() {
     fails(1, &["report", "--reference", &i8, "--candidate", &f16, "--quick", "--out", &out]);
     fails(1, &["report", "--reference", &f16, "--candidate", "no/such.safetensors", "--quick", "--out", &out]);
     fails(2, &["report", "--reference", &f16, "--candidate", &i8, "--quick"]);
+}
+
+/// A pair of the featherweight tier: rows by its kind, errors of the poses, no latents.
+#[test]
+fn a_pair_without_latents_has_a_report() {
+    let dir = Scratch::new("report-dram");
+    let (reference, out) = (golden_path("dram-tcn.safetensors"), dir.path("out").to_str().unwrap().to_owned());
+    let reference = reference.to_str().unwrap();
+    let options = Options { scheme: Scheme::I8, smallest: 0, keep: &[], calibration: None, budget: None };
+    let bytes = quantise(&visavis::BundleFile::open(reference).unwrap(), &options).unwrap().bytes;
+    let i8 = dir.file("i8.safetensors", bytes).to_str().unwrap().to_owned();
+    succeeds(&["report", "--reference", reference, "--candidate", &i8, reference, "--quick", "--out", &out]);
+    let read = |name: &str| std::fs::read_to_string(dir.path("out").join(name)).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&read("report.json")).unwrap();
+    let [changed, same] = [0, 1].map(|i| &json["numerics"]["candidates"][i]["blocks"]);
+    let names: Vec<_> = changed.as_array().unwrap().iter().map(|b| b["sampler"].as_str().unwrap()).collect();
+    assert_eq!(names, ["dram", "dram, voices exchanged"]);
+    for (b, equal) in changed.as_array().unwrap().iter().zip(same.as_array().unwrap()) {
+        assert!((1e-3..50.0).contains(&b["mm"]["mean"].as_f64().unwrap()), "{}", b["mm"]);
+        assert!(b["latent_sqnr_db"].as_f64().unwrap() > 10.0 && b["round_trip_mm"].is_null());
+        // The reference against itself: every block is begun as it began it.
+        assert_eq!(equal["mm"]["max"], 0.0);
+        assert_ne!(b["bits"], equal["bits"]);
+    }
+    let output = &json["numerics"]["candidates"][0]["tensors"][0]["output"];
+    assert!(output["rows"].as_u64().unwrap() > 0, "layers are heard: {output}");
+    assert_eq!(json["speed"][1]["samplers"][0][0], "dram");
+    let md = read("report.md");
+    assert!(md.contains("| dram |") && !md.contains("midpoint") && !md.contains("VAE"), "{md}");
 }

@@ -11,7 +11,7 @@ use jni::sys::{jboolean, jdouble, jfloat, jint, jlong};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU32;
 use std::sync::atomic::Ordering::Relaxed;
-use visavis::glam::{Quat, Vec3};
+use visavis::glam::Vec3;
 use visavis::{BLOCK_FRAMES, Frame, Governor, Root, Session, SessionOptions, SharedSession, Speaker, VoiceInput};
 
 pub(crate) static SESSIONS: Table<SharedSession> = Table::new("session");
@@ -272,7 +272,7 @@ fn push_pose<'l>(
     time: f64,
 ) -> Outcome {
     around(session, |shared| {
-        shared.head().push_pose(Vec3::new(x, y, z), Some(Quat::from_xyzw(qx, qy, qz, qw)), time);
+        shared.head().push_numbers([x, y, z, qx, qy, qz, qw], time);
         Ok(())
     })
 }

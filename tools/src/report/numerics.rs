@@ -2,6 +2,7 @@
 //! teacher-forced blocks.
 
 use super::spread::{Spread, cosine, sqnr};
+use crate::contents::made_with;
 use serde::{Deserialize, Serialize};
 use visavis::internals::bundle::StoredWeights;
 use visavis::internals::kernels::{Activations, Epilogue, Exec, Kernels, Matrix, Scheme};
@@ -48,7 +49,7 @@ pub struct LayerOutput {
 /// Teacher-forced blocks of one sampler.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Blocks {
-    /// The sampler, and whether the voices were exchanged.
+    /// The sampler (of bundles without any, their kind), and whether the voices were exchanged.
     pub sampler: String,
     /// Frames compared.
     pub frames: usize,
@@ -58,13 +59,14 @@ pub struct Blocks {
     pub degrees: Spread,
     /// The gaze score.
     pub gaze: Spread,
-    /// Signal to noise of the latents, dB.
+    /// Signal to noise of the latents, dB; of the kind `dram` of the poses.
     pub latent_sqnr_db: Option<f64>,
-    /// Positions after encoder and decoder, of the reference's motion, millimetres.
-    pub round_trip_mm: Spread,
+    /// Positions after encoder and decoder, of the reference's motion, millimetres; none of bundles
+    /// that have none.
+    pub round_trip_mm: Option<Spread>,
     /// By joint.
     pub joints: Vec<JointRow>,
-    /// Hash of the candidate's latents: the same bits give the same number on any machine.
+    /// Hash of the candidate's latents or poses: the same bits give the same number on any machine.
     pub bits: String,
 }
 
@@ -123,7 +125,7 @@ pub(super) fn measure(
     let mut teachers = Vec::new();
     for sampler in samplers.into_iter().flatten() {
         for (scene, told) in [(scene.clone(), ""), (scene.exchanged(), ", voices exchanged")] {
-            let label = format!("{sampler}{told}");
+            let label = format!("{}{told}", made_with(&reference.engine, sampler));
             progress(&format!("reference, {label}"));
             teachers.push((label, Teacher::new(&reference.engine, scene, sampler, SEED, &mut activations)?));
         }
@@ -209,7 +211,7 @@ impl Blocks {
             degrees: Spread::of(frames.iter().flat_map(|f| &f.angles), degrees),
             gaze: Spread::of(frames.iter().filter_map(|f| f.gaze.as_ref()), 1.0),
             latent_sqnr_db: sqnr(&forced.latents[0], &forced.latents[1]),
-            round_trip_mm: Spread::of(&forced.round_trip, mm),
+            round_trip_mm: (!forced.round_trip.is_empty()).then(|| Spread::of(&forced.round_trip, mm)),
             joints: reference.config().rig.joints.iter().enumerate().map(joint).collect(),
             bits: format!("{hash:016x}"),
         }

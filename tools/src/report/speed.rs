@@ -1,6 +1,7 @@
 //! Time, bytes and memory of each bundle, measured in turns in one run.
 
 use super::numerics::Loaded;
+use crate::contents::made_with;
 use serde::Serialize;
 use std::time::Instant;
 use visavis::internals::frame::BLOCK_SAMPLES;
@@ -17,7 +18,7 @@ pub struct Speed {
     pub weight_bytes: usize,
     /// Bytes of a session's key-value caches.
     pub cache_bytes: usize,
-    /// For each sampler: its name, bytes of weights that a block reads, median milliseconds of a
+    /// For each sampler (of bundles without any, their kind): its name, bytes of weights that a block reads, median milliseconds of a
     /// block, and that over the reference's.
     pub samplers: Vec<(String, usize, f64, f64)>,
 }
@@ -37,7 +38,8 @@ pub(super) fn measure(loaded: &[&Loaded], blocks: usize, progress: &dyn Fn(&str)
     let student = loaded.iter().all(|l| l.engine.config().student.is_some());
     let samplers = [Some(Sampler::Midpoint4), student.then_some(Sampler::Single)];
     for sampler in samplers.into_iter().flatten() {
-        progress(&format!("speed in turns, {sampler}"));
+        let label = made_with(&loaded[0].engine, sampler);
+        progress(&format!("speed in turns, {label}"));
         let options = || SessionOptions { sampler, ..SessionOptions::default() };
         let mut sessions = loaded.iter().map(|l| l.engine.session(options())).collect::<Result<Vec<_>>>()?;
         let mut times = vec![Vec::with_capacity(blocks); sessions.len()];
@@ -56,7 +58,7 @@ pub(super) fn measure(loaded: &[&Loaded], blocks: usize, progress: &dyn Fn(&str)
         let medians: Vec<f64> = times.into_iter().map(median).collect();
         for (((speed, loaded), session), ms) in speeds.iter_mut().zip(loaded).zip(&sessions).zip(&medians) {
             speed.cache_bytes = session.stats().cache_bytes;
-            speed.samplers.push((sampler.to_string(), loaded.engine.block_bytes(sampler), *ms, ms / medians[0]));
+            speed.samplers.push((label.clone(), loaded.engine.block_bytes(sampler), *ms, ms / medians[0]));
         }
     }
     Ok(speeds)

@@ -7,16 +7,31 @@ use super::document::Document;
 use super::spread::Spread;
 use super::{Blocks, Numerics, Report};
 
+/// Whether the bundles are of the flow model, and so have latents, samplers and noise.
+fn has_latents(report: &Report) -> bool {
+    report.numerics.candidates.iter().flat_map(|c| &c.blocks).any(|b| b.round_trip_mm.is_some())
+}
+
+/// Head of the column that says what made the motion.
+fn maker(report: &Report) -> &'static str {
+    if has_latents(report) { "sampler" } else { "generator" }
+}
+
 /// The whole report.
 pub(super) fn document(report: &Report) -> Document {
     let mut d = Document::default();
     d.heading(1, "Accuracy of quantised bundles");
     let levels = format!("{} ({})", report.numerics.level, report.numerics.arch);
+    let (noise, told) = if has_latents(report) {
+        let told = ", with each sampler. The quantiser rounds for the sample conversation with other noise; the exchanged voices are new to it.";
+        (", with the same noise", told)
+    } else {
+        ("", ". These bundles are deterministic: they have no latents, samplers or noise.")
+    };
     d.text(format!(
         "Reference: {} (matrices {}), {}. CPU level {levels}. Sizes are against {:.2} MB, the reference's parameters as f32. \
-         Errors are teacher-forced: every block is computed from the reference's past, with the same noise, over {} blocks of the \
-         sample conversation and as many with its voices exchanged, with each sampler. The quantiser rounds for the sample conversation \
-         with other noise; the exchanged voices are new to it.",
+         Errors are teacher-forced: every block is computed from the reference's past{noise}, over {} blocks of the \
+         sample conversation and as many with its voices exchanged{told}",
         report.reference,
         report.reference_schemes,
         report.made_by,
@@ -57,7 +72,7 @@ fn in_short(report: &Report, d: &mut Document) {
     }
     let head = [
         "bundle",
-        "sampler",
+        maker(report),
         "size / f32",
         "joints, mean mm",
         "p99 mm",
@@ -100,7 +115,7 @@ fn speed(report: &Report, d: &mut Document) {
     }
     let head = [
         "bundle",
-        "sampler",
+        maker(report),
         "file MB",
         "weights MB",
         "caches MB",
@@ -125,7 +140,7 @@ fn machines(report: &Report, d: &mut Document) {
     };
     d.text(format!(
         "The same {} blocks on {} ({}) and on {} ({}). Integer sums are exact and float sums have a fixed order on every level, so the \
-         bits of the latents are to be the same.",
+         bits of the latents, or of the poses where there are none, are to be the same.",
         other.blocks, other.arch, other.level, here.arch, here.level
     ));
     let mut rows = Vec::new();
@@ -144,10 +159,7 @@ fn machines(report: &Report, d: &mut Document) {
         ]);
     }
     let (a, b) = (format!("mm here ({})", here.arch), format!("there ({})", other.arch));
-    d.table(
-        &["bundle", "sampler", &a, &b, "difference", "p99 here", "there", "difference", "bits of the latents"],
-        rows,
-    );
+    d.table(&["bundle", maker(report), &a, &b, "difference", "p99 here", "there", "difference", "bits"], rows);
 }
 
 /// Blocks of the same candidate and sampler on both machines: there, its name, here.

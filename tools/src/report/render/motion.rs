@@ -3,7 +3,7 @@
 use super::super::chart::{bars, lines, number};
 use super::super::document::Document;
 use super::super::{Blocks, Judged, Measures, Report};
-use super::{db, four};
+use super::{db, four, has_latents, maker};
 
 pub(super) fn blocks(report: &Report, d: &mut Document) {
     d.heading(2, "Teacher-forced blocks");
@@ -14,33 +14,20 @@ pub(super) fn blocks(report: &Report, d: &mut Document) {
             row.extend(four(&b.mm));
             row.extend(four(&b.degrees));
             row.extend([number(b.gaze.mean), number(b.gaze.p99), db(b.latent_sqnr_db)]);
-            row.extend([number(b.round_trip_mm.mean), number(b.round_trip_mm.p99)]);
+            row.extend(b.round_trip_mm.iter().flat_map(|mm| [number(mm.mean), number(mm.p99)]));
             rows.push(row);
         }
     }
-    let head = [
-        "bundle",
-        "sampler",
-        "frames",
-        "mm mean",
-        "p50",
-        "p99",
-        "max",
-        "deg mean",
-        "p50",
-        "p99",
-        "max",
-        "gaze mean",
-        "p99",
-        "latents dB",
-        "VAE mm mean",
-        "p99",
-    ];
+    let latents = has_latents(report);
+    let mut head = vec!["bundle", maker(report), "frames"];
+    head.extend(["mm mean", "p50", "p99", "max", "deg mean", "p50", "p99", "max", "gaze mean", "p99"]);
+    head.extend(if latents { &["latents dB", "VAE mm mean", "p99"][..] } else { &["poses dB"] });
     d.table(&head, rows);
-    d.text(
-        "Joints: distance and angle to the reference's, over all joints and frames. VAE: the reference's motion through encoder and \
-         decoder, against the reference's own, which is what re-anchoring sees.",
-    );
+    let vae = " VAE: the reference's motion through encoder and decoder, against the reference's own, which is what re-anchoring sees.";
+    d.text(format!(
+        "Joints: distance and angle to the reference's, over all joints and frames.{}",
+        if latents { vae } else { "" }
+    ));
     let first: Vec<(&String, &Blocks)> =
         report.numerics.candidates.iter().filter_map(|c| Some((&c.name, c.blocks.first()?))).collect();
     let Some((_, some)) = first.first() else { return };
@@ -63,10 +50,14 @@ pub(super) fn blocks(report: &Report, d: &mut Document) {
 pub(super) fn free(report: &Report, d: &mut Document) {
     let f = &report.free;
     d.heading(2, "Free-running sessions");
+    let latents = has_latents(report);
+    let (with, equal) =
+        if latents { (", with the default sampler and re-anchoring", " from equal noise") } else { ("", "") };
+    let seed = if latents { "tells how much chance alone changes" } else { "has nothing to change" };
     d.text(format!(
-        "{:.1} minutes of the sample conversation, repeated, with the default sampler and re-anchoring. Sessions from equal noise part \
-         because each block builds on the one before; their distributions have to agree. FGD is the Frechet distance of poses (m²) and of \
-         accelerations ((m/s²)²) from the reference's run. The row with another seed tells how much chance alone changes.",
+        "{:.1} minutes of the sample conversation, repeated{with}. Sessions{equal} part because each block builds on the one before; \
+         their distributions have to agree. FGD is the Frechet distance of poses (m²) and of accelerations ((m/s²)²) from the \
+         reference's run. The row with another seed {seed}.",
         f.minutes
     ));
     let all: Vec<&Measures> = [&f.reference, &f.other_seed].into_iter().chain(&f.candidates).collect();
