@@ -30,7 +30,7 @@ pub struct Hearing {
     vector: Vec<f32>,
     /// Whether there was anything to listen to in the block before.
     open: bool,
-    /// Whether the vector's first part is that of the next block.
+    /// Whether the block that was listened to last was heard.
     heard: bool,
 }
 
@@ -100,13 +100,23 @@ impl Hearing {
         self.sources.skip(block);
     }
 
-    /// The sound vector of the block that was listened for, once, with the agent's root at the end
-    /// of the block that was heard, and its features `[4, features]`; none where nothing was ever
-    /// pushed.
-    pub fn vector(&mut self, root: &Root, sensitivity: f32) -> Option<(&[f32], &[f32])> {
-        if !std::mem::take(&mut self.heard) {
-            return None;
-        }
+    /// Whether the last block was listened to, and anything had been pushed.
+    pub fn has_heard(&self) -> bool {
+        self.heard
+    }
+
+    /// What the left and the right ear heard of it, `[2, 3200]` pascals.
+    pub fn ears(&self) -> &[f32] {
+        self.ears.as_flattened()
+    }
+
+    /// Its features, `[4, features]`.
+    pub fn features(&self) -> &[f32] {
+        &self.features
+    }
+
+    /// Its sound vector, `[S]`, with the agent's root at its end.
+    pub fn vector(&mut self, root: &Root, sensitivity: f32) -> &[f32] {
         let rest = &mut self.vector[self.features.len() + 2 * BLOCK_FRAMES..];
         let place = self.sources.salient().map_or([0.0; 5], |place| {
             let local = root.to_local(Vec3::from(place.map(|v| v as f32)));
@@ -118,7 +128,7 @@ impl Hearing {
         });
         rest[..5].copy_from_slice(&place);
         rest[5] = sensitivity;
-        Some((&self.vector, &self.features))
+        &self.vector
     }
 
     /// Starts anew: nothing was pushed. Waits for pushes that are under way.

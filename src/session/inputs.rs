@@ -337,10 +337,12 @@ impl Inputs {
             self.condition.set_user(&positions);
             tell(probe, block, "conditioning.user", &positions);
         }
-        if let Some((vector, features)) = self.hearing.as_mut().and_then(|hearing| hearing.vector(root, sensitivity)) {
+        if let Some(hearing) = self.hearing.as_mut().filter(|hearing| hearing.has_heard()) {
+            let vector = hearing.vector(root, sensitivity);
             self.condition.set_sound(vector);
-            tell(probe, block, "hearing.features", features);
             tell(probe, block, "conditioning.sound", vector);
+            tell(probe, block, "hearing.ears", hearing.ears());
+            tell(probe, block, "hearing.features", hearing.features());
         }
         if let Some(Cue { value, guided }) = gaze {
             self.condition.set_gaze(value, guided);
