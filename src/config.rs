@@ -81,6 +81,9 @@ pub struct Config {
     pub flow: FlowConfig,
     /// Single-step student, when the bundle holds one.
     pub student: Option<StudentConfig>,
+    /// Hearing of sounds in the room, of the kind `sarah`; none: sounds are not heard.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hearing: Option<HearingConfig>,
     /// Predictors of the kind `dram`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dram: Option<DramConfig>,
@@ -203,6 +206,23 @@ impl VaeConfig {
 impl FlowConfig {
     fn is_empty(&self) -> bool {
         self.layers == 0
+    }
+}
+
+/// Hearing of sounds in the room.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HearingConfig {
+    /// Encoder of what both ears hear.
+    pub audio: AudioConfig,
+    /// Width of the embedding of the sound vector.
+    pub embed: usize,
+}
+
+impl HearingConfig {
+    /// Length S of a block's sound vector: features of 4 frames, levels of 4 frames at 2 ears, the
+    /// place of what stands out (5), and the sensitivity.
+    pub fn width(&self) -> usize {
+        4 * self.audio.features + 8 + 5 + 1
     }
 }
 

@@ -66,6 +66,8 @@ pub struct Engine {
     pub(crate) config: Config,
     pub(crate) kernels: Kernels,
     pub(crate) audio: AudioWeights,
+    /// Of the encoder of sounds in the room, where the bundle has hearing.
+    pub(crate) hearing: Option<AudioWeights>,
     #[cfg(feature = "tract")]
     pub(crate) audio_source: AudioSource,
     pub(crate) model: Model,
@@ -176,7 +178,11 @@ impl Engine {
             let message = "a bundle of the kind `mospa` reacts to whole clips of sound and has no sessions; run it with `visavis react`";
             return Err(Error::new(ErrorKind::Argument, message));
         }
-        let audio_source = AudioSource::load(t, &config.audio)?;
+        let audio_source = AudioSource::load(t, &config.audio, "audio")?;
+        let hearing = config.hearing.as_ref().map(|h| {
+            let source = AudioSource::load(t, &h.audio, "hearing")?;
+            source.pack(kernels, &h.audio)
+        });
         let mut exec = exec(&config, kernels, 1)?;
         let model = match &config.dram {
             None => Model::Sarah(Box::new(Sarah::load(t, kernels, &mut exec, &config, networks)?)),
@@ -187,6 +193,7 @@ impl Engine {
         };
         let engine = Self {
             audio: audio_source.pack(kernels, &config.audio)?,
+            hearing: hearing.transpose()?,
             model,
             #[cfg(feature = "tract")]
             audio_source,
@@ -235,6 +242,11 @@ impl Engine {
         &self.config.rig
     }
 
+    /// Whether the bundle hears sounds in the room ([`Session::push_sound`](crate::Session::push_sound)).
+    pub fn has_hearing(&self) -> bool {
+        self.hearing.is_some()
+    }
+
     /// Whether the single-step student was loaded, which [`Sampler::Single`] needs.
     pub fn has_student(&self) -> bool {
         self.sarah().is_ok_and(|sarah| sarah.student.is_some())
@@ -273,6 +285,7 @@ impl Engine {
     /// Bytes of all packed weights.
     pub fn weight_bytes(&self) -> usize {
         self.audio.bytes()
+            + self.hearing.as_ref().map_or(0, AudioWeights::bytes)
             + match &self.model {
                 Model::Sarah(sarah) => sarah.bytes(),
                 Model::Dram(dram) => dram.bytes(),
@@ -280,10 +293,11 @@ impl Engine {
     }
 
     /// Bytes of packed weights that a block with `sampler` reads: the flow once per evaluation, the
-    /// decoder once, the audio encoder once per voice; of the kind `dram`, the predictors once per
+    /// decoder once, the audio encoder once per voice, that of sounds in the room once; of the kind `dram`, the predictors once per
     /// frame. Re-anchoring and slots that catch up come on top.
     pub fn block_bytes(&self, sampler: Sampler) -> usize {
         2 * self.audio.bytes()
+            + self.hearing.as_ref().map_or(0, AudioWeights::bytes)
             + match &self.model {
                 Model::Sarah(sarah) => sarah.block_bytes(sampler),
                 Model::Dram(dram) => BLOCK_FRAMES * dram.bytes(),
@@ -292,7 +306,7 @@ impl Engine {
 
     /// Conditioning layout of the flow networks.
     pub(crate) fn layout(&self) -> ConditionLayout {
-        ConditionLayout { audio_features: self.config.audio.features }
+        ConditionLayout::of(&self.config)
     }
 
     /// An executor with scratch for the widest operation of any of the networks.
@@ -303,13 +317,14 @@ impl Engine {
 
 /// An executor for all networks of `config`.
 fn exec(config: &Config, kernels: Kernels, threads: usize) -> Result<Exec> {
-    let audio = AudioEncoder::width(&config.audio);
+    let hearing = config.hearing.as_ref().map_or(0, |h| AudioEncoder::width(&h.audio));
+    let audio = AudioEncoder::width(&config.audio).max(hearing);
     let (features, joints) = (config.audio.features, config.rig.len());
     let width = match &config.dram {
         None => model::widest(config),
         Some(dram) => Dram::widest_of(dram, joints, features),
     };
-    // Voices are what is shared out whole.
+    // Voices, and the room, are what is shared out whole.
     Exec::new(kernels, threads, width.max(audio))?.with_workers(audio)
 }
 

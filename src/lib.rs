@@ -5,7 +5,7 @@
 //!   [`Joint`], and [`openxr`]'s
 //! - a conversation: [`Session`], [`SessionOptions`], [`Sampler`], [`EulerSteps`], [`Governor`],
 //!   [`Budget`]; several: [`Team`]
-//! - other threads: [`VoiceInput`], [`Speaker`], [`HeadInput`], [`Controls`], [`SharedSession`],
+//! - other threads: [`VoiceInput`], [`Speaker`], [`HeadInput`], [`SoundInput`], [`Controls`], [`SharedSession`],
 //!   [`threads`]
 //! - what comes out: [`Frame`], [`Root`], [`Transform`]; vectors and rotations of `glam`
 //! - constants: [`FPS`], [`BLOCK_FRAMES`], [`SAMPLE_RATE`]
@@ -26,6 +26,7 @@ mod engine;
 mod error;
 mod flow;
 mod frame;
+mod hearing;
 #[allow(unsafe_code, reason = "SIMD loads, stores and inline assembly")]
 #[cfg_attr(feature = "kernel-tests", allow(unused, reason = "tests without their harness"))]
 mod kernels;
@@ -51,6 +52,7 @@ pub use engine::{Engine, Networks};
 pub use error::{Error, ErrorKind, Result};
 pub use frame::{BLOCK_FRAMES, EulerSteps, FPS, Frame, Root, SAMPLE_RATE, Sampler, Transform};
 pub use glam;
+pub use hearing::SoundInput;
 pub use rig::{Joint, Rig};
 pub use session::{Budget, Controls, Governor, Session, SessionOptions, SharedSession, Team};
 pub use user::HeadInput;
@@ -58,6 +60,7 @@ pub use user::HeadInput;
 /// What a session counts and measures ([`Session::stats`]).
 pub mod stats {
     pub use crate::audio::VoiceStats;
+    pub use crate::hearing::SoundStats;
     pub use crate::pose::GuardStats;
     pub use crate::session::{Delays, GovernorStats, InputStats, SessionStats};
     pub use crate::user::TrackStats;
@@ -89,7 +92,7 @@ pub mod internals {
         ($($room:ident)*) => { $(pub mod $room { pub use crate::$room::*; })* };
     }
 
-    rooms!(audio bounded bundle config dram engine flow frame kernels mospa nn normaliser par pose session user vae);
+    rooms!(audio bounded bundle config dram engine flow frame hearing kernels mospa nn normaliser par pose session user vae);
     #[cfg(feature = "quant")]
     rooms!(quant);
 }

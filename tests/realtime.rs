@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::{Inputs, dram, dram_in, tiny, tiny_in};
+use common::{Inputs, dram, dram_in, hearing, hearing_in, tiny, tiny_in};
 use glam::{Quat, Vec3};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;
@@ -191,6 +191,7 @@ fn a_running_session_does_not_allocate() {
         assert!(stats.held_blocks > 0 && (!flow || stats.catch_up_passes > 0), "{stats:?}");
     }
     falling_back_does_not_allocate(&engines, &inputs);
+    hearing_does_not_allocate();
     // Sessions stepped together, some of which share passes.
     for (engine, threads) in engines.iter().flat_map(|e| [(e, 1), (e, 2)]) {
         let mut team = engine.team(threads).unwrap();
@@ -220,6 +221,45 @@ fn a_running_session_does_not_allocate() {
         });
         assert_eq!(calls, 0, "allocations of a team of {threads} threads");
         assert!(team.shared_blocks() > 40);
+    }
+}
+
+/// Sixteen sounds at once, some of a rate that is resampled, sources that come and go, a seventeenth, ends,
+/// alone and in a team: after each slot has had a sound of each rate, neither pushing nor computing allocates.
+fn hearing_does_not_allocate() {
+    let sound: Vec<f32> = (0..6_400).map(|i| 0.3 * (i as f32 * 0.05).sin()).collect();
+    for (engine, threads) in [(hearing(), 1), (hearing_in(Scheme::I8), 2)] {
+        let mut session = engine.session(SessionOptions { threads, ..Default::default() }).unwrap();
+        let mut team = engine.team(1).unwrap();
+        let place = |id: u32| Vec3::new((id as f32).sin() * 2.0, 1.5, (id as f32).cos() * 3.0);
+        let mut blocks = |session: &mut Session, count: u32, ids: u32| {
+            for block in 0..count {
+                for id in 0..ids {
+                    let rate = [24_000, 48_000][id as usize % 2];
+                    let samples = &sound[..rate as usize / 24_000 * 3_200];
+                    session.push_sound(id, samples, rate, place(id + block)).unwrap();
+                }
+                if block % 9 == 8 {
+                    session.end_sound(block % 16).unwrap();
+                }
+                // For a while there are none, and some end.
+                let now = session.next_due();
+                if block % 3 == 0 {
+                    team.step(&mut [(&mut *session, now)]).unwrap();
+                } else {
+                    std::hint::black_box(session.poll(now).unwrap().unwrap());
+                }
+            }
+        };
+        blocks(&mut session, 2, 20);
+        let calls = allocations(|| {
+            blocks(&mut session, 30, 16);
+            blocks(&mut session, 10, 0);
+            blocks(&mut session, 30, 20);
+        });
+        assert_eq!(calls, 0, "allocations of a session that hears, with {threads} threads");
+        let stats = session.stats().inputs.sounds;
+        assert!(stats.started > 16 && stats.refused + stats.replaced > 0, "{stats:?}");
     }
 }
 

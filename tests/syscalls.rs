@@ -12,7 +12,7 @@
 
 mod common;
 
-use common::{Inputs, dram, tiny};
+use common::{Inputs, dram, hearing, tiny};
 use visavis::{Budget, Engine, Governor, Sampler, Session, SessionOptions, Speaker};
 
 /// What became of a child that ran `work` under the filter.
@@ -98,7 +98,7 @@ fn compute(session: &mut Session, blocks: usize) {
 
 #[test]
 fn blocks_make_no_system_call() {
-    for engine in [tiny(), dram("tcn"), dram("lstm")] {
+    for engine in [tiny(), hearing(), dram("tcn"), dram("lstm")] {
         blocks_of(&engine);
     }
 }
@@ -117,6 +117,14 @@ fn blocks_of(engine: &std::sync::Arc<Engine>) {
     }
     assert_eq!(confined(|| compute(&mut session, 40)), Fate::Through);
 
+    let heard = session.sounds();
+    let place = glam::Vec3::new(1.0, 1.5, -2.0);
+    if heard.is_heard() {
+        for id in 0..16 {
+            heard.push(id, &[0.2; 24_000], 24_000, place).unwrap();
+            heard.push(id, &[0.2; 4_800], 48_000, place).unwrap();
+        }
+    }
     let (voice, head, controls) = (session.voice_input(Speaker::User), session.head_input(), session.controls());
     let sound = [0.1; 480];
     let mut pushed = || {
@@ -127,6 +135,9 @@ fn blocks_of(engine: &std::sync::Arc<Engine>) {
                 3 => voice.clear(),
                 5 => voice.set_present(i < 20),
                 _ => head.push(glam::Vec3::new(0.0, 1.6, 2.0), session.next_due()),
+            }
+            if heard.is_heard() {
+                all &= heard.push(i as u32 % 20, &sound, 24_000, place).is_ok() && heard.end(30 + i as u32).is_ok();
             }
             all &= controls.set_gaze((i % 2 > 0).then_some(0.5)).is_ok();
             all &= controls.set_sampler([Sampler::Single, Sampler::Midpoint4][i % 2]).is_ok();

@@ -1,5 +1,5 @@
 /* Every function of visavis.h, used as a program would and as it should not. Arguments: the bundle, beside which
- * dram-tcn.safetensors lies. Exit code 0 when all is well. */
+ * dram-tcn.safetensors and hearing.safetensors lie. Exit code 0 when all is well. */
 #include "check.h"
 #include <fcntl.h>
 #include <inttypes.h>
@@ -211,14 +211,99 @@ static uint64_t drive(const visavis_engine *engine, uint32_t threads, int blocks
     return digest;
 }
 
+/* Another bundle, which lies beside the one at `path`. */
+static visavis_engine *beside(const char *path, const char *name) {
+    char at[4096];
+    const char *slash = strrchr(path, '/');
+    snprintf(at, sizeof at, "%.*s%s", slash ? (int)(slash + 1 - path) : 0, path, name);
+    visavis_engine *engine = NULL;
+    OK(visavis_engine_from_path(at, &engine));
+    return engine;
+}
+
+/* Two blocks beside a bang at (x, 1, -2), pushed in `pieces`, if any; returns a digest of the hips. */
+static uint64_t beside_a_bang(const visavis_engine *engine, int pieces, float x, float sensitivity) {
+    float bang[9600];
+    for (int i = 0; i < 9600; i++) bang[i] = (float)((i * 7919) % 2000 - 1000) / 1000 * (float)(9600 - i) / 9600 * 8;
+    visavis_session *session = NULL;
+    visavis_session_options options;
+    OK(visavis_session_options_init(&options, sizeof options));
+    options.sensitivity = sensitivity;
+    OK(visavis_session_new(engine, &options, &session));
+    for (int i = 0; i < pieces; i++)
+        OK(visavis_session_push_sound(session, 7, bang + i * (9600 / pieces), 9600 / (size_t)pieces, 24000, x, 1, -2));
+    visavis_frame frames[VISAVIS_BLOCK_FRAMES];
+    uint64_t digest = 0xcbf29ce484222325u;
+    for (int k = 0; k < 4; k++) {
+        uint32_t count;
+        OK(visavis_session_poll(session, 1, frames, sizeof *frames, NULL, 0, &count));
+        for (size_t i = 0; i < sizeof frames; i++) digest = (digest ^ ((const uint8_t *)frames)[i]) * 0x100000001b3u;
+    }
+    visavis_stats stats = {.struct_size = sizeof stats};
+    OK(visavis_session_stats(session, &stats));
+    CHECK(stats.sound_pieces == (uint64_t)pieces && stats.sound_started == (pieces > 0) && stats.sound_refused == 0);
+    visavis_session_free(session);
+    return digest;
+}
+
+/* Sounds in the room: heard by a bundle with hearing, refused by the others. */
+static void sounds(const visavis_engine *deaf, const char *path) {
+    visavis_engine *engine = beside(path, "hearing.safetensors");
+    visavis_session *session = NULL;
+    float sound[960] = {0.5f};
+    CHECK(visavis_engine_has_hearing(engine) == 1 && visavis_engine_has_hearing(deaf) == 0 && visavis_engine_has_hearing(NULL) == 0);
+    uint64_t bang = beside_a_bang(engine, 1, 1, 0);
+    CHECK(bang == beside_a_bang(engine, 4, 1, 0));
+    CHECK(bang != beside_a_bang(engine, 0, 1, 0) && bang != beside_a_bang(engine, 1, -1, 0) && bang != beside_a_bang(engine, 1, 1, 1));
+
+    OK(visavis_session_new(deaf, NULL, &session));
+    REFUSED(ARGUMENT, visavis_session_push_sound(session, 1, sound, 960, 48000, 0, 1, 2));
+    CHECK(strstr(visavis_last_error(), "hearing") != NULL);
+    REFUSED(ARGUMENT, visavis_session_end_sound(session, 1));
+    OK(visavis_session_set_sensitivity(session, 1));
+    visavis_session_free(session);
+
+    visavis_session_options options;
+    OK(visavis_session_options_init(&options, sizeof options));
+    CHECK(options.sensitivity == 0);
+    options.sensitivity = 1.6f;
+    REFUSED(ARGUMENT, visavis_session_new(engine, &options, &session));
+    options.sensitivity = NAN;
+    REFUSED(ARGUMENT, visavis_session_new(engine, &options, &session));
+    OK(visavis_session_new(engine, NULL, &session));
+    visavis_engine_free(engine);
+    REFUSED(ARGUMENT, visavis_session_set_sensitivity(session, -1.6f));
+    REFUSED(ARGUMENT, visavis_session_set_sensitivity(session, NAN));
+    OK(visavis_session_set_sensitivity(session, -1));
+    REFUSED(ARGUMENT, visavis_session_push_sound(session, 1, sound, 960, 48000, NAN, 1, 2));
+    REFUSED(ARGUMENT, visavis_session_push_sound(session, 1, sound, 960, 48000, 0, INFINITY, 2));
+    REFUSED(AUDIO, visavis_session_push_sound(session, 1, sound, 960, 0, 0, 1, 2));
+    REFUSED(ARGUMENT, visavis_session_push_sound(session, 1, NULL, 960, 48000, 0, 1, 2));
+    REFUSED(ARGUMENT, visavis_session_push_sound(NULL, 1, sound, 960, 48000, 0, 1, 2));
+    sound[3] = NAN;
+    sound[4] = -65;
+    REFUSED(AUDIO, visavis_session_push_sound(session, 1, sound, 960, 48000, 0, 1, 2));
+    OK(visavis_session_push_sound(session, 1, NULL, 0, 48000, 0.5f, 1, 2));
+    OK(visavis_session_end_sound(session, 1));
+    OK(visavis_session_end_sound(session, 99));
+    sound[3] = sound[4] = 0;
+    /* Of a hundred sources 32 wait, and 16 sound; inside the head is 0.3 m from it. */
+    for (uint32_t id = 100; id < 200; id++) OK(visavis_session_push_sound(session, id, sound, 960, 48000, 0, 1.6f, 0));
+    visavis_frame frames[VISAVIS_BLOCK_FRAMES];
+    uint32_t count;
+    for (int k = 0; k < 3; k++) OK(visavis_session_poll(session, 1, frames, sizeof *frames, NULL, 0, &count));
+    CHECK(isfinite(frames[3].hips[1]));
+    visavis_stats stats = {.struct_size = sizeof stats};
+    OK(visavis_session_stats(session, &stats));
+    CHECK(stats.sound_bad_places == 2 && stats.sound_bad_rate_samples == 960 && stats.sound_non_finite_samples == 1);
+    CHECK(stats.sound_clipped_samples == 1 && stats.sound_refused >= 84);
+    visavis_session_free(session);
+}
+
 /* Blocks that come late are left to a bundle of the featherweight tier, which lies beside the first one. */
 static void fallback(const visavis_engine *engine, const char *path) {
-    char beside[4096];
-    const char *slash = strrchr(path, '/');
-    snprintf(beside, sizeof beside, "%.*sdram-tcn.safetensors", slash ? (int)(slash + 1 - path) : 0, path);
-    visavis_engine *light = NULL;
     visavis_session *session = NULL, *other = NULL;
-    OK(visavis_engine_from_path(beside, &light));
+    visavis_engine *light = beside(path, "dram-tcn.safetensors");
     visavis_session_options options;
     OK(visavis_session_options_init(&options, sizeof options));
     options.budget_ms = 100;
@@ -292,6 +377,7 @@ int main(int argc, char **argv) {
     OK(visavis_engine_from_path(argv[1], &engine));
     options_and_versions(engine);
     fallback(engine, argv[1]);
+    sounds(engine, argv[1]);
 
     CHECK(strlen(visavis_engine_name(engine)) > 0 && strcmp(visavis_engine_joint_name(engine, 0), "hips") == 0);
     CHECK(visavis_engine_joint_name(engine, 1000) == NULL && visavis_engine_joint_count(NULL) == 0);

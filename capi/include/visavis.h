@@ -1,5 +1,5 @@
 /*
- * Visavis: full-body motion of a virtual agent from two voices and the user's head. C interface.
+ * Visavis: full-body motion of a virtual agent from two voices, the user's head and sounds in the room. C interface.
  *
  * Use: load an engine from a bundle, make a session on it, push voices and head positions as they come, poll frames.
  * Units: metres, seconds, radians; right-handed, Y up. Times are session time: 0 when the session starts.
@@ -16,10 +16,10 @@
  *
  * THREADS
  *  - An engine may be used by any number of threads at once, and so may the inputs and settings of a session: the functions push, finish,
- *    clear, set (but set_fallback) and report. They never wait for a block or for another thread, and never return VISAVIS_STATUS_BUSY, whatever the others
+ *    clear, end, set (but set_fallback) and report. They never wait for a block or for another thread, and never return VISAVIS_STATUS_BUSY, whatever the others
  *    do. A block goes by what came before its poll began: the same inputs give the same motion, whichever threads they come from. A
- *    voice is one stream: one thread pushes its sound, while commands may come from others. After the first push of a voice, or
- *    of another rate, pushing does not allocate.
+ *    voice is one stream: one thread pushes its sound, while commands may come from others. So is
+ *    each sound source. After the first push of a voice, or of another rate, pushing does not allocate.
  *  - All other functions of a session, poll, reset, set_fallback and stats among them, are one thread's at a time, though not always the same one's: such
  *    a call while another one is under way returns VISAVIS_STATUS_BUSY and does nothing. Freeing is the last call of all.
  *
@@ -48,8 +48,8 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-// Version of this interface, 1.2: major number in the upper 16 bits, minor in the lower.
-#define VISAVIS_ABI_VERSION ((1 << 16) | 2)
+// Version of this interface, 1.3: major number in the upper 16 bits, minor in the lower.
+#define VISAVIS_ABI_VERSION ((1 << 16) | 3)
 
 // Frames that a poll gives when a block is due.
 #define VISAVIS_BLOCK_FRAMES 4
@@ -207,6 +207,11 @@ typedef struct visavis_session_options {
     // computed last, 0.5 to 60 (default); what is more is dropped and counted. A second takes 192
     // KB: a crowd that hears sound as it comes does with the least.
     double voice_ahead;
+    // Since interface 1.3. How much the agent minds sounds in the room: -1 dull, 0 (default)
+    // neutral, 1 sensitive, numbers between and up to 1.5 either way.
+    float sensitivity;
+    // 0.
+    uint32_t reserved2;
 } visavis_session_options;
 
 // One frame of motion, without its joints. World coordinates: metres, right-handed, Y up.
@@ -327,6 +332,28 @@ typedef struct visavis_stats {
     // Since interface 1.2. Blocks that the fallback made instead of a pose being held
     // (visavis_session_set_fallback).
     uint64_t governor_fallback_blocks;
+    // Since interface 1.3. Pushes of sounds in the room that were taken, whole or in part; this and
+    // the next nine are 0 where the bundle has no hearing.
+    uint64_t sound_pieces;
+    // Sources that began to sound.
+    uint64_t sound_started;
+    // Dropped because a source was more than ten seconds ahead, 24 kHz samples.
+    uint64_t sound_overflow_samples;
+    // Clipped to 64 pascals, input samples: a sign of integers pushed as floats.
+    uint64_t sound_clipped_samples;
+    // Not finite, which silence replaced, input samples.
+    uint64_t sound_non_finite_samples;
+    // Pushed at a rate out of range and not taken, input samples.
+    uint64_t sound_bad_rate_samples;
+    // Pushes with a place that is no number or absurdly far.
+    uint64_t sound_bad_places;
+    // Dropped because another thread was inside the same source's input and lost its core there
+    // for long, input samples.
+    uint64_t sound_contended_samples;
+    // Pushes and sources that were dropped because too many, or sixteen louder ones, sounded.
+    uint64_t sound_refused;
+    // Sources that gave way to a louder one.
+    uint64_t sound_replaced;
 } visavis_stats;
 
 #ifdef __cplusplus
@@ -358,6 +385,10 @@ void visavis_engine_free(struct visavis_engine *engine);
 
 // Name of the model; NULL for a NULL engine.
 const char *visavis_engine_name(const struct visavis_engine *engine);
+
+// Whether the bundle has hearing, so that visavis_session_push_sound is heard: 1 or 0; 0 for a NULL
+// engine. Since interface 1.3.
+int32_t visavis_engine_has_hearing(const struct visavis_engine *engine);
 
 // Number of joints of a frame; 0 for a NULL engine.
 uint32_t visavis_engine_joint_count(const struct visavis_engine *engine);
@@ -439,6 +470,38 @@ visavis_status visavis_session_push_user_pose(struct visavis_session *session,
                                               float qz,
                                               float qw,
                                               double time);
+
+// Pushes a piece of what sound source `id` in the room gives off: `count` mono samples of `rate` Hz
+// (8000 to 192000), pascals as they are 1 m from it (RMS 1 is 94 dB SPL); (x, y, z) is where it is
+// from now on, world metres.
+//
+// The first piece of a source, and the first after it ran dry, sounds from the start of the next
+// block on; further pieces follow it without a gap, up to ten seconds ahead. No samples move a
+// source that sounds. Sixteen sources sound at once: one more takes the place of the quietest at
+// the agent's head, if it is louder. What is dropped is counted (visavis_stats).
+//
+// VISAVIS_STATUS_ARGUMENT where the bundle has no hearing (visavis_engine_has_hearing), and for a
+// place that is not finite or beyond 2000 km; the sound of a source that has a place is taken all
+// the same. VISAVIS_STATUS_AUDIO for a rate out of range, of which nothing is taken, and for
+// samples that are not finite, in whose place there is silence. From any thread, one at a time for
+// a source. Since interface 1.3.
+visavis_status visavis_session_push_sound(struct visavis_session *session,
+                                          uint32_t id,
+                                          const float *samples,
+                                          size_t count,
+                                          uint32_t rate,
+                                          float x,
+                                          float y,
+                                          float z);
+
+// Ends sound source `id` at once: what no block has heard of it is dropped. Without effect where
+// it does not sound; VISAVIS_STATUS_ARGUMENT where the bundle has no hearing. From any thread.
+// Since interface 1.3.
+visavis_status visavis_session_end_sound(struct visavis_session *session, uint32_t id);
+
+// Sets how much the agent minds sounds in the room from the next block on: -1 dull, 0 neutral, 1
+// sensitive, numbers between and up to 1.5 either way. Since interface 1.3.
+visavis_status visavis_session_set_sensitivity(struct visavis_session *session, float sensitivity);
 
 // Sets the gaze target from the next block on, -1 to 1: 0 is averted, 1 sustained eye
 // contact.

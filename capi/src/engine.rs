@@ -133,6 +133,14 @@ pub unsafe extern "C" fn visavis_engine_name(engine: *const VisavisEngine) -> *c
     unsafe { borrow(engine, "engine") }.map_or(std::ptr::null(), |e| e.name.as_ptr())
 }
 
+/// Whether the bundle has hearing, so that visavis_session_push_sound is heard: 1 or 0; 0 for a NULL
+/// engine. Since interface 1.3.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_engine_has_hearing(engine: *const VisavisEngine) -> i32 {
+    // SAFETY: the header's promise.
+    unsafe { borrow(engine, "engine") }.map_or(0, |e| i32::from(e.engine.has_hearing()))
+}
+
 /// Number of joints of a frame; 0 for a NULL engine.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_engine_joint_count(engine: *const VisavisEngine) -> u32 {

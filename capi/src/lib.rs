@@ -23,8 +23,8 @@ pub use threads::*;
 
 use std::ffi::c_char;
 
-/// Version of this interface, 1.2: major number in the upper 16 bits, minor in the lower.
-pub const VISAVIS_ABI_VERSION: u32 = (1 << 16) | 2;
+/// Version of this interface, 1.3: major number in the upper 16 bits, minor in the lower.
+pub const VISAVIS_ABI_VERSION: u32 = (1 << 16) | 3;
 
 /// Frames that a poll gives when a block is due.
 pub const VISAVIS_BLOCK_FRAMES: usize = 4;

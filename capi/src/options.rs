@@ -64,6 +64,11 @@ pub struct VisavisSessionOptions {
     /// computed last, 0.5 to 60 (default); what is more is dropped and counted. A second takes 192
     /// KB: a crowd that hears sound as it comes does with the least.
     pub voice_ahead: f64,
+    /// Since interface 1.3. How much the agent minds sounds in the room: -1 dull, 0 (default)
+    /// neutral, 1 sensitive, numbers between and up to 1.5 either way.
+    pub sensitivity: f32,
+    /// 0.
+    pub reserved2: u32,
     /// Of test builds.
     #[cfg(feature = "grown")]
     pub grown: u64,
@@ -92,6 +97,8 @@ impl VisavisSessionOptions {
             budget_ms: 0.0,
             reserved: 0,
             voice_ahead: SessionOptions::default().voice_ahead,
+            sensitivity: 0.0,
+            reserved2: 0,
             #[cfg(feature = "grown")]
             grown: crate::structs::GROWN,
         }
@@ -124,6 +131,7 @@ impl VisavisSessionOptions {
             guard: o.guard != 0,
             governor: Governor::within(o.budget_ms),
             voice_ahead: o.voice_ahead,
+            sensitivity: o.sensitivity,
             ..Default::default()
         })
     }

@@ -223,6 +223,61 @@ pub unsafe extern "C" fn visavis_session_push_user_pose(
     unsafe { around(session, tell) }
 }
 
+/// Pushes a piece of what sound source `id` in the room gives off: `count` mono samples of `rate` Hz
+/// (8000 to 192000), pascals as they are 1 m from it (RMS 1 is 94 dB SPL); (x, y, z) is where it is
+/// from now on, world metres.
+///
+/// The first piece of a source, and the first after it ran dry, sounds from the start of the next
+/// block on; further pieces follow it without a gap, up to ten seconds ahead. No samples move a
+/// source that sounds. Sixteen sources sound at once: one more takes the place of the quietest at
+/// the agent's head, if it is louder. What is dropped is counted (visavis_stats).
+///
+/// VISAVIS_STATUS_ARGUMENT where the bundle has no hearing (visavis_engine_has_hearing), and for a
+/// place that is not finite or beyond 2000 km; the sound of a source that has a place is taken all
+/// the same. VISAVIS_STATUS_AUDIO for a rate out of range, of which nothing is taken, and for
+/// samples that are not finite, in whose place there is silence. From any thread, one at a time for
+/// a source. Since interface 1.3.
+#[unsafe(no_mangle)]
+#[allow(clippy::too_many_arguments, reason = "a place's numbers, one by one")]
+pub unsafe extern "C" fn visavis_session_push_sound(
+    session: *mut VisavisSession,
+    id: u32,
+    samples: *const f32,
+    count: usize,
+    rate: u32,
+    x: f32,
+    y: f32,
+    z: f32,
+) -> VisavisStatus {
+    let push = |shared: &SharedSession| {
+        // SAFETY: the header's promise.
+        let samples = unsafe { slice(samples, count, "samples") }?;
+        Ok(shared.sounds().push(id, samples, rate, Vec3::new(x, y, z))?)
+    };
+    // SAFETY: the header's promise.
+    unsafe { around(session, push) }
+}
+
+/// Ends sound source `id` at once: what no block has heard of it is dropped. Without effect where
+/// it does not sound; VISAVIS_STATUS_ARGUMENT where the bundle has no hearing. From any thread.
+/// Since interface 1.3.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_end_sound(session: *mut VisavisSession, id: u32) -> VisavisStatus {
+    // SAFETY: the header's promise.
+    unsafe { around(session, |shared| Ok(shared.sounds().end(id)?)) }
+}
+
+/// Sets how much the agent minds sounds in the room from the next block on: -1 dull, 0 neutral, 1
+/// sensitive, numbers between and up to 1.5 either way. Since interface 1.3.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_set_sensitivity(
+    session: *mut VisavisSession,
+    sensitivity: f32,
+) -> VisavisStatus {
+    // SAFETY: the header's promise.
+    unsafe { around(session, |s| Ok(s.controls().set_sensitivity(sensitivity)?)) }
+}
+
 /// Sets the gaze target from the next block on, -1 to 1: 0 is averted, 1 sustained eye
 /// contact.
 #[unsafe(no_mangle)]

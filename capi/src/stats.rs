@@ -90,6 +90,28 @@ pub struct VisavisStats {
     /// Since interface 1.2. Blocks that the fallback made instead of a pose being held
     /// (visavis_session_set_fallback).
     pub governor_fallback_blocks: u64,
+    /// Since interface 1.3. Pushes of sounds in the room that were taken, whole or in part; this and
+    /// the next nine are 0 where the bundle has no hearing.
+    pub sound_pieces: u64,
+    /// Sources that began to sound.
+    pub sound_started: u64,
+    /// Dropped because a source was more than ten seconds ahead, 24 kHz samples.
+    pub sound_overflow_samples: u64,
+    /// Clipped to 64 pascals, input samples: a sign of integers pushed as floats.
+    pub sound_clipped_samples: u64,
+    /// Not finite, which silence replaced, input samples.
+    pub sound_non_finite_samples: u64,
+    /// Pushed at a rate out of range and not taken, input samples.
+    pub sound_bad_rate_samples: u64,
+    /// Pushes with a place that is no number or absurdly far.
+    pub sound_bad_places: u64,
+    /// Dropped because another thread was inside the same source's input and lost its core there
+    /// for long, input samples.
+    pub sound_contended_samples: u64,
+    /// Pushes and sources that were dropped because too many, or sixteen louder ones, sounded.
+    pub sound_refused: u64,
+    /// Sources that gave way to a louder one.
+    pub sound_replaced: u64,
     /// Of test builds.
     #[cfg(feature = "grown")]
     pub grown: u64,
@@ -146,6 +168,16 @@ impl From<SessionStats> for VisavisStats {
             user_bad_rate_samples: s.inputs.user_voice.bad_rate_samples,
             user_contended_samples: s.inputs.user_voice.contended_samples,
             governor_fallback_blocks: s.governor.fallback_blocks,
+            sound_pieces: s.inputs.sounds.pieces,
+            sound_started: s.inputs.sounds.started,
+            sound_overflow_samples: s.inputs.sounds.overflow_samples,
+            sound_clipped_samples: s.inputs.sounds.clipped_samples,
+            sound_non_finite_samples: s.inputs.sounds.non_finite_samples,
+            sound_bad_rate_samples: s.inputs.sounds.bad_rate_samples,
+            sound_bad_places: s.inputs.sounds.bad_places,
+            sound_contended_samples: s.inputs.sounds.contended_samples,
+            sound_refused: s.inputs.sounds.refused,
+            sound_replaced: s.inputs.sounds.replaced,
             #[cfg(feature = "grown")]
             grown: crate::structs::GROWN,
         }

@@ -57,6 +57,12 @@ enum Step {
     Present(bool, bool),
     Finish(bool),
     Clear(bool),
+    /// A sound in the room: source, length, rate, value, place.
+    Source(u8, u16, u32, f32, [f32; 3]),
+    /// The same of a rate that is allowed, within some metres.
+    GoodSource(u8, u16, u8, [i8; 3]),
+    EndSource(u8),
+    Sensitivity(f32),
     /// Settings by the way of other threads.
     Elsewhere(Option<f32>, f32, u8),
     Replay,
@@ -173,6 +179,20 @@ fn take(session: &mut Session, step: Step, next: &mut Option<u64>) -> u32 {
             sound.iter_mut().enumerate().for_each(|(i, s)| *s = (i as f32 * 0.1).sin());
             push(session, agent, &sound[..usize::from(len) % sound.len()], rate).expect("a good sound");
         }
+        Step::Source(id, len, rate, value, place) => {
+            sound.fill(value);
+            let samples = &sound[..usize::from(len) % sound.len()];
+            typed(session.push_sound(u32::from(id), samples, rate, Vec3::from(place)));
+        }
+        Step::GoodSource(id, len, i, place) => {
+            let rate = [24_000, 48_000, 8_000, 192_000][usize::from(i.saturating_sub(250)) % 4];
+            sound.iter_mut().enumerate().for_each(|(i, s)| *s = 60.0 * (i as f32 * 0.1).sin());
+            let samples = &sound[..usize::from(len) % sound.len()];
+            let place = Vec3::from(place.map(f32::from)) / 20.0;
+            session.sounds().push(u32::from(id), samples, rate, place).expect("a good sound");
+        }
+        Step::EndSource(id) => session.end_sound(u32::from(id)).expect("a source or none"),
+        Step::Sensitivity(sensitivity) => typed(session.set_sensitivity(sensitivity)),
         Step::Head(p, time) => typed(session.push_user_head(Vec3::from(p), time)),
         Step::GoodHead(p, later) => {
             let time = session.next_due() + f64::from(later) / 100.0;

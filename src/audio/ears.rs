@@ -1,29 +1,21 @@
 //! What two ears hear of sounds somewhere: spherical head, distance, first reflections of a room
 //! and a short diffuse tail (`training/visavis_train/mospa/ears.py` is mirrored here).
 //!
-//! Delays are Woodworth's (1938), level and shadow the one-pole one-zero filter of Brown and Duda
-//! (1998). Samples are pascals at 24 kHz, within +-1: RMS 1 is 94 dB SPL. The head's centre is 1.6 m
+//! Samples are pascals at 24 kHz, within +-1: RMS 1 is 94 dB SPL. The head's centre is 1.6 m
 //! above the origin, it faces +Z, the left ear is at +X.
 
 use super::features::{Complex, Fft};
+use super::head::{self, NEAREST, SPEED, around, brightness};
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::SAMPLE_RATE;
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::TAU;
 
 /// Height of the head's centre, metres.
 pub const HEAD_HEIGHT: f64 = 1.6;
 /// Radius of the head, metres; a source inside is refused.
-pub const HEAD_RADIUS: f64 = 0.0875;
+pub const HEAD_RADIUS: f64 = head::RADIUS;
 /// Farthest coordinate of a source, metres.
 pub const FARTHEST: f64 = 100.0;
-/// A nearer source is heard as from here, metres from the centre.
-const NEAREST: f64 = 0.3;
-/// Speed of sound, m/s.
-const SPEED: f64 = 343.0;
-/// Least high-frequency gain of the head's shadow.
-const SHADOW: f64 = 0.1;
-/// Angle from the ear's axis where that is.
-const DARKEST: f64 = 150.0 * PI / 180.0;
 /// Longest tail, and what rings on after a sound: half a second.
 const RING: usize = SAMPLE_RATE as usize / 2;
 
@@ -75,9 +67,7 @@ fn paths(place: [f64; 3]) -> (f64, [f64; 2], [f64; 2]) {
     let r = d.iter().map(|v| v * v).sum::<f64>().sqrt().max(1e-6);
     let angles = [d[0] / r, -d[0] / r].map(|cosine| libm::acos(cosine.clamp(-1.0, 1.0)));
     let r = r.max(NEAREST);
-    let around = |angle: f64| if angle < FRAC_PI_2 { -libm::cos(angle) } else { angle - FRAC_PI_2 };
-    let gain = |angle: f64| (1.0 + SHADOW / 2.0) + (1.0 - SHADOW / 2.0) * libm::cos(angle / DARKEST * PI);
-    (r, angles.map(|angle| (r + HEAD_RADIUS * around(angle)) / SPEED), angles.map(gain))
+    (r, angles.map(|angle| (r + HEAD_RADIUS * around(angle)) / SPEED), angles.map(brightness))
 }
 
 /// Fails for a place where no source can be.

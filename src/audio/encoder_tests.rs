@@ -74,7 +74,7 @@ impl Net {
     fn packed(&self, kernels: &Kernels) -> AudioWeights {
         let layers = self.layers();
         let (out, layers) = layers.split_last().unwrap();
-        AudioWeights::new(kernels, &self.0, layers, *out).unwrap()
+        AudioWeights::new(kernels, &self.0, "audio", layers, *out).unwrap()
     }
 
     /// The definition, in f64, over the whole signal with zeros before it.
@@ -223,7 +223,7 @@ fn unfit_configs_and_weights_are_refused() {
     let (out, layers) = layers.split_last().unwrap();
     let kernels = Kernels::detect().unwrap();
     let refused = |layers: &[LayerWeights<'_>], out| {
-        let e = AudioWeights::new(&kernels, &net.0, layers, out).unwrap_err();
+        let e = AudioWeights::new(&kernels, &net.0, "audio", layers, out).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::BundleInvalid);
     };
     refused(&layers[1..], *out);

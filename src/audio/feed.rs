@@ -18,6 +18,7 @@ pub(super) enum Command {
     Finish,
     Clear,
     Present(bool),
+    Begin,
 }
 
 impl Command {
@@ -30,6 +31,7 @@ impl Command {
                 Self::Finish => 0,
                 Self::Clear => 1,
                 Self::Present(present) => 2 + u64::from(present),
+                Self::Begin => 4,
             }
     }
 
@@ -38,7 +40,8 @@ impl Command {
             0 => Self::Finish,
             1 => Self::Clear,
             2 => Self::Present(false),
-            _ => Self::Present(true),
+            3 => Self::Present(true),
+            _ => Self::Begin,
         }
     }
 }
@@ -52,12 +55,12 @@ impl Feed {
                 None => Resampler::new(rate)?,
             };
             self.finish(line);
-            let more = next.latency_samples().saturating_sub(line.lag());
-            line.set_lag(line.lag() + more);
-            line.push_silence(more);
             self.resampler = Some(next);
         }
         if let Some(resampler) = &mut self.resampler {
+            let more = resampler.latency_samples().saturating_sub(line.lag());
+            line.set_lag(line.lag() + more);
+            line.push_silence(more);
             resampler.push(samples, |s| line.push(s));
         }
         line.set_present(true);
@@ -79,6 +82,12 @@ impl Feed {
                     self.clear(line);
                 }
                 line.set_present(present);
+            }
+            Command::Begin => {
+                line.set_lag(0);
+                if let Some(resampler) = &mut self.resampler {
+                    resampler.reset();
+                }
             }
         }
     }

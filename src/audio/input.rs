@@ -19,17 +19,11 @@ use std::sync::atomic::Ordering::{Relaxed, SeqCst};
 use std::sync::atomic::fence;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
-/// Samples beyond this are clipped: 18 dB over full scale, far from any voice and far from
-/// overflow.
-const CLIP: f32 = 8.0;
 /// Samples that are handled at once.
 const PIECE: usize = 256;
 /// Words of a record of the inbox: what it is, and two samples a word.
 const WORDS: usize = 1 + PIECE / 2;
-/// Records that the inbox holds. A push takes one for each 256 samples that it begins, so these
-/// are 0.6 s of 48 kHz that comes 64 samples at a time, and 2.4 s of 10 ms at a time.
-const INBOX: usize = 512;
-/// Of these, kept for commands: sound that is too much is dropped before any command is.
+/// Records of the inbox that are kept for commands: sound that is too much is dropped before any command is.
 const COMMANDS: usize = 32;
 
 /// One of the two who talk.
@@ -75,13 +69,16 @@ struct Shared {
     line: Line,
     inbox: Queue<WORDS>,
     feed: Mutex<Feed>,
+    /// Samples beyond this are clipped.
+    clip: f32,
 }
 
 impl VoiceInput {
-    /// A voice that holds `samples` of 24 kHz; absent.
-    pub(super) fn new(samples: usize) -> Self {
-        let (line, inbox) = (Line::new(samples), Queue::new(INBOX));
-        Self { shared: Arc::new(Shared { line, inbox, feed: Mutex::default() }) }
+    /// A voice that holds `samples` of 24 kHz of up to `clip`, and `inbox` records while another
+    /// thread is inside; absent.
+    pub(super) fn new(samples: usize, clip: f32, inbox: usize) -> Self {
+        let (line, inbox) = (Line::new(samples), Queue::new(inbox));
+        Self { shared: Arc::new(Shared { line, inbox, feed: Mutex::default(), clip }) }
     }
 
     pub(super) fn line(&self) -> &Line {
@@ -104,7 +101,7 @@ impl VoiceInput {
     /// infinity among the samples, in whose place there is silence: the rest of the push is taken.
     /// Both are counted.
     pub fn push(&self, samples: &[f32], rate: u32) -> Result<()> {
-        let Shared { line, inbox, .. } = &*self.shared;
+        let Shared { line, inbox, clip, .. } = &*self.shared;
         if let Err(e) = check_rate(rate) {
             line.counts.bad_rate.fetch_add(samples.len() as u64, Relaxed);
             return Err(e);
@@ -114,10 +111,10 @@ impl VoiceInput {
         let mut pieces = samples.chunks(PIECE).map(|piece| {
             let not_finite = piece.iter().filter(|s| !s.is_finite()).count();
             let clipped =
-                piece.iter().filter(|s| s.abs() > CLIP).count() - piece.iter().filter(|s| s.is_infinite()).count();
+                piece.iter().filter(|s| s.abs() > *clip).count() - piece.iter().filter(|s| s.is_infinite()).count();
             bad += not_finite;
             line.counts.clipped.fetch_add(clipped as u64, Relaxed);
-            let cleaned = |s: &f32| if s.is_finite() { s.clamp(-CLIP, CLIP) } else { 0.0 };
+            let cleaned = |s: &f32| if s.is_finite() { s.clamp(-clip, *clip) } else { 0.0 };
             clean.iter_mut().zip(piece).for_each(|(to, s)| *to = cleaned(s));
             (clean, piece.len())
         });
@@ -171,6 +168,18 @@ impl VoiceInput {
     /// being computed may hear silence already. The voice stays present.
     pub fn clear(&self) {
         self.command(Command::Clear);
+    }
+
+    /// What is pushed from here on is another sound: what the resampler still holds is forgotten, and
+    /// the lag of resampling comes first again, so that a stream that is pushed as it is heard is
+    /// never short.
+    pub(crate) fn begin(&self) {
+        self.command(Command::Begin);
+    }
+
+    /// Whether all that was pushed has been taken or cleared.
+    pub(crate) fn is_drained(&self) -> bool {
+        self.shared.line.is_drained()
     }
 
     /// Makes the voice present (silent until something is pushed), or absent until the next push,

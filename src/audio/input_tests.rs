@@ -1,4 +1,5 @@
-use super::{COMMANDS, INBOX, PIECE};
+use super::super::voice::INBOX;
+use super::{COMMANDS, PIECE};
 use crate::audio::tests::{block, noise};
 use crate::audio::{Voice, VoiceStats};
 use crate::error::ErrorKind;

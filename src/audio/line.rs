@@ -149,6 +149,11 @@ impl Line {
         self.taken.store(at, Release);
     }
 
+    /// Whether all that was written has been taken or cleared.
+    pub(super) fn is_drained(&self) -> bool {
+        self.written.load(Acquire) <= self.taken.load(Acquire).max(self.cleared.load(Acquire))
+    }
+
     /// What was counted; underruns are the reader's to count.
     pub(super) fn stats(&self) -> VoiceStats {
         let Counts { overflow, clipped, non_finite, bad_rate, contended } = &self.counts;

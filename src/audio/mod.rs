@@ -15,9 +15,11 @@ mod encoder;
 #[cfg(feature = "internals")]
 pub mod features;
 mod feed;
+pub mod head;
 mod input;
 mod line;
 mod resample;
+mod stream;
 #[cfg(feature = "tract")]
 mod tract;
 mod voice;
@@ -29,6 +31,7 @@ pub use line::VoiceStats;
 #[cfg(feature = "internals")]
 pub use resample::resample_to_24k;
 pub use resample::{MAX_RATE, MIN_RATE, Resampler, check_rate};
+pub use stream::Stream;
 #[cfg(feature = "tract")]
 pub use tract::TractEncoder;
 pub use voice::{VOICE_SECONDS, Voice};

@@ -2,12 +2,19 @@
 //! kHz.
 
 use super::input::VoiceInput;
-use super::line::{Glimpse, VoiceStats};
+use super::line::VoiceStats;
+use super::stream::Stream;
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::{BLOCK_SAMPLES, SAMPLE_RATE};
 
 /// Seconds of sound that a [`Voice::new`] holds ahead of the block that was taken last (5.8 MB).
 pub const VOICE_SECONDS: f64 = 60.0;
+/// Samples beyond this are clipped: 18 dB over full scale, far from any voice and far from
+/// overflow.
+const CLIP: f32 = 8.0;
+/// Records that the inbox holds. A push takes one for each 256 samples that it begins, so these
+/// are 0.6 s of 48 kHz that comes 64 samples at a time, and 2.4 s of 10 ms at a time.
+pub(super) const INBOX: usize = 512;
 
 /// A voice on the session's time line: sample `n` is heard `n / 24000` s after the session's start.
 ///
@@ -21,13 +28,9 @@ pub const VOICE_SECONDS: f64 = 60.0;
 /// This is the end that is heard, and one thread's; [`Voice::input`] is the end that is pushed
 /// into, any thread's.
 pub struct Voice {
-    input: VoiceInput,
-    /// What [`Voice::look`] found.
-    seen: Glimpse,
-    /// Sample of the session's time line that the next one of the stream becomes, and its number in
-    /// the stream.
+    stream: Stream,
+    /// Sample of the session's time line that the next one of the stream becomes.
     start: u64,
-    at: u64,
     underrun: u64,
 }
 
@@ -40,20 +43,19 @@ impl Voice {
     /// A voice that holds `seconds` (0.5 to 3600, else clamped) beyond the block that was taken
     /// last.
     pub fn with_capacity(seconds: f64) -> Self {
-        let input = VoiceInput::new((seconds.clamp(0.5, 3600.0) * f64::from(SAMPLE_RATE)) as usize);
-        Self { input, seen: Glimpse::default(), start: 0, at: 0, underrun: 0 }
+        let samples = (seconds.clamp(0.5, 3600.0) * f64::from(SAMPLE_RATE)) as usize;
+        Self { stream: Stream::new(samples, CLIP, INBOX), start: 0, underrun: 0 }
     }
 
     /// The end that is pushed into.
     pub fn input(&self) -> &VoiceInput {
-        &self.input
+        self.stream.input()
     }
 
     /// Takes notice of what was pushed: blocks that are taken from now on, until the next look,
     /// hear that and no more.
     pub fn look(&mut self) {
-        self.seen = self.input.line().glimpse();
-        self.at = self.at.max(self.seen.cleared);
+        self.stream.look();
     }
 
     /// Takes the sound of block `block` (samples `3200 block` up to `3200 (block + 1)`); returns
@@ -70,20 +72,12 @@ impl Voice {
         };
         let passed = from - self.start;
         self.start = from + BLOCK_SAMPLES as u64;
-        if !self.seen.present {
+        if !self.is_present() {
             out.fill(0.0);
             return Ok(false);
         }
-        let line = self.input.line();
-        self.at += passed.min(self.seen.written - self.at);
-        let mut have = (self.seen.written - self.at).min(BLOCK_SAMPLES as u64) as usize;
-        line.read(self.at, &mut out[..have]);
-        if line.is_cut(self.at) {
-            have = 0;
-        }
-        self.at += have as u64;
-        line.take(self.at);
-        out[have..].fill(0.0);
+        self.stream.pass(passed);
+        let have = self.stream.take(out);
         self.underrun += (BLOCK_SAMPLES - have) as u64;
         Ok(true)
     }
@@ -91,24 +85,23 @@ impl Voice {
     /// Whether there is a voice at all. An absent voice is not a silent one: the model was trained
     /// with both.
     pub fn is_present(&self) -> bool {
-        self.seen.present
+        self.stream.is_present()
     }
 
     /// Samples (24 kHz) by which sound is heard later because it was resampled: 0 at 24 kHz, else
     /// the longest look-ahead of the rates that were pushed.
     pub fn lag_samples(&self) -> usize {
-        self.input.line().lag()
+        self.stream.lag()
     }
 
     /// Counters since the start.
     pub fn stats(&self) -> VoiceStats {
-        VoiceStats { underrun_samples: self.underrun, ..self.input.line().stats() }
+        VoiceStats { underrun_samples: self.underrun, ..self.stream.stats() }
     }
 
     /// Absent and empty; the next sound that is pushed belongs to block `block` and those after it.
     pub fn reset_at(&mut self, block: u64) {
-        self.input.reset();
-        self.look();
+        self.stream.reset();
         (self.start, self.underrun) = (block * BLOCK_SAMPLES as u64, 0);
     }
 }

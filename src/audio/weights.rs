@@ -1,4 +1,4 @@
-//! Weights of the audio encoder: checked against the configuration, packed for the CPU.
+//! Weights of an audio encoder: checked against the configuration, packed for the CPU.
 
 use crate::config::{AudioConfig, ConvConfig};
 use crate::error::{Error, ErrorKind, Result};
@@ -28,7 +28,8 @@ impl LayerWeights<'_> {
     }
 }
 
-/// Packed weights of the audio encoder; immutable, shared by both voices and by all sessions.
+/// Packed weights of an audio encoder; immutable, shared by all that it listens to and by all
+/// sessions.
 #[derive(Debug)]
 pub struct AudioWeights {
     pub(super) layers: Vec<(ConvConfig, Matrix)>,
@@ -36,7 +37,7 @@ pub struct AudioWeights {
 }
 
 impl AudioWeights {
-    /// Checks and packs `layers` (first to last) and the output layer.
+    /// Checks and packs `layers` (first to last) and the output layer of the encoder `prefix`.
     ///
     /// # Errors
     /// [`ErrorKind::BundleInvalid`] as [`check_audio_config`], and when weights and config
@@ -44,6 +45,7 @@ impl AudioWeights {
     pub fn new(
         kernels: &Kernels,
         config: &AudioConfig,
+        prefix: &str,
         layers: &[LayerWeights<'_>],
         out: LayerWeights<'_>,
     ) -> Result<Self> {
@@ -51,8 +53,8 @@ impl AudioWeights {
         let pack = |name: &str, l: &LayerWeights<'_>| kernels.pack(l.weights, Some(l.bias)).named(name);
         let layers = config.layers.iter().zip(layers).enumerate();
         Ok(Self {
-            layers: layers.map(|(i, (conv, l))| (*conv, pack(&format!("audio.conv.{i}"), l))).collect(),
-            out: pack("audio.out", &out),
+            layers: layers.map(|(i, (conv, l))| (*conv, pack(&format!("{prefix}.conv.{i}"), l))).collect(),
+            out: pack(&format!("{prefix}.out"), &out),
         })
     }
 

@@ -1,4 +1,4 @@
-//! The audio encoder's weights as a bundle holds them.
+//! The audio encoders' weights as a bundle holds them.
 
 use super::{StoredWeights, Tensors};
 use crate::audio::{AudioWeights, LayerWeights};
@@ -11,6 +11,7 @@ use crate::kernels::Kernels;
 pub struct AudioSource {
     layers: Vec<Plain>,
     out: Plain,
+    prefix: &'static str,
 }
 
 #[derive(Debug)]
@@ -20,18 +21,20 @@ struct Plain {
 }
 
 impl AudioSource {
-    /// Reads `audio.conv.*` (`[outputs, kernel, inputs]`) and `audio.out` (`[features, last]`).
+    /// Reads `{prefix}.conv.*` (`[outputs, kernel, inputs]`) and `{prefix}.out` (`[features,
+    /// last]`); prefixes are `audio`, of voices, and `hearing`.
     ///
     /// # Errors
     /// As [`Tensors::weights`].
-    pub fn load(t: &Tensors<'_>, config: &AudioConfig) -> Result<Self> {
+    pub fn load(t: &Tensors<'_>, config: &AudioConfig, prefix: &'static str) -> Result<Self> {
         let conv = |(i, c): (usize, &crate::config::ConvConfig)| {
-            Plain::load(t, &format!("audio.conv.{i}"), &[c.outputs, c.kernel, c.inputs])
+            Plain::load(t, &format!("{prefix}.conv.{i}"), &[c.outputs, c.kernel, c.inputs])
         };
         let last = config.layers.last().map_or(1, |c| c.outputs);
         Ok(Self {
             layers: config.layers.iter().enumerate().map(conv).collect::<Result<_>>()?,
-            out: Plain::load(t, "audio.out", &[config.features, last])?,
+            out: Plain::load(t, &format!("{prefix}.out"), &[config.features, last])?,
+            prefix,
         })
     }
 
@@ -40,7 +43,7 @@ impl AudioSource {
     /// # Errors
     /// As [`AudioWeights::new`].
     pub fn pack(&self, kernels: Kernels, config: &AudioConfig) -> Result<AudioWeights> {
-        AudioWeights::new(&kernels, config, &self.borrow(), self.out.borrow())
+        AudioWeights::new(&kernels, config, self.prefix, &self.borrow(), self.out.borrow())
     }
 
     /// Builds the network on tract.

@@ -7,7 +7,7 @@
 
 use super::invalid;
 use crate::audio::check_audio_config;
-use crate::config::{Config, DramConfig, GazeConfig, GazeCurve, Kind, LstmConfig, MospaConfig, TcnConfig};
+use crate::config::{AudioConfig, Config, DramConfig, GazeConfig, GazeCurve, Kind, LstmConfig, MospaConfig, TcnConfig};
 use crate::error::Result;
 use crate::frame::feature_count;
 use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES};
@@ -121,6 +121,14 @@ fn sarah(c: &Config) -> Result<()> {
     if let Some(g) = &c.gaze {
         gaze(g)?;
     }
+    if let Some(h) = &c.hearing {
+        within("hearing.audio.layers", h.audio.layers.len(), 1, 32)?;
+        check_audio_config(&h.audio).map_err(|e| invalid(format!("the config's hearing: {e}")))?;
+        within("hearing.audio.features", h.audio.features, 1, 4096)?;
+        within("hearing.embed", h.embed, 1, 4096)?;
+        // What was heard is heard at the head of the frames before.
+        within("user_delay_blocks", c.user_delay_blocks as usize, 1, 1)?;
+    }
     Ok(())
 }
 
@@ -184,13 +192,18 @@ fn session_bytes(c: &Config) -> u128 {
             DramConfig::Lstm { monadic, dyadic } => lstm(monadic) + lstm(dyadic),
         }
     });
-    let mut audio = 0;
-    let mut samples = BLOCK_SAMPLES;
-    for layer in &c.audio.layers {
-        audio += product(&[samples + layer.kernel, layer.inputs]) + product(&[64, layer.kernel, layer.inputs]);
-        samples /= layer.stride;
-    }
-    4 * (flow + vae + tokens + anchor + rows + modulation + predictors + 2 * audio)
+    let encoder = |audio: &AudioConfig| {
+        let mut samples = BLOCK_SAMPLES;
+        let layers = audio.layers.iter().map(|layer| {
+            let input = product(&[samples + layer.kernel, layer.inputs]) + product(&[64, layer.kernel, layer.inputs]);
+            samples /= layer.stride;
+            input
+        });
+        layers.sum::<u128>()
+    };
+    // The sources' samples, ten seconds each, come on top: they are the same for all models.
+    let hearing = c.hearing.as_ref().map_or(0, |h| encoder(&h.audio) + product(&[w.window_blocks + 9, h.width()]));
+    4 * (flow + vae + tokens + anchor + rows + modulation + predictors + 2 * encoder(&c.audio) + hearing)
 }
 
 fn width(name: &str, width: usize, heads: usize) -> Result<()> {

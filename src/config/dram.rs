@@ -88,6 +88,7 @@ impl From<DramBundle> for Config {
             vae: VaeConfig::default(),
             flow: FlowConfig::default(),
             student: None,
+            hearing: None,
             dram: Some(dram),
             mospa: None,
             session,

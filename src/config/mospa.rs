@@ -59,6 +59,7 @@ impl From<MospaBundle> for Config {
             vae: VaeConfig::default(),
             flow: FlowConfig::default(),
             student: None,
+            hearing: None,
             dram: None,
             mospa: Some(mospa),
             session,

@@ -54,7 +54,7 @@ impl Sarah {
         }
         let features = feature_count(config.rig.joints.len());
         let latent = config.vae.latent;
-        let layout = ConditionLayout { audio_features: config.audio.features };
+        let layout = ConditionLayout::of(config);
         let idle = Idle::read(t, features, latent)?;
         let net = |prefix: &str, wanted: bool, times: Vec<f32>| {
             if !wanted {
@@ -62,7 +62,7 @@ impl Sarah {
                 return Ok(None);
             }
             let times = (!networks.modulation).then_some(times.as_slice());
-            FlowNet::load(t, kernels, &config.flow, latent, layout, prefix, times).map(Some)
+            FlowNet::load(t, kernels, config, layout, prefix, times).map(Some)
         };
         // Tensors of a student that the config does not have are not skipped: they are an error.
         let student = config.student.map(|s| net("student", networks.student, student_times(s.tau_history)));
@@ -145,8 +145,9 @@ impl Sarah {
 pub(super) fn widest(c: &Config) -> usize {
     let flow = [c.flow.width * c.flow.mlp.max(6), c.flow.embed_user + 2 * c.flow.embed_voice + c.flow.embed_gaze + 4];
     let features = feature_count(c.rig.joints.len());
+    let sound = c.hearing.as_ref().map_or(0, |h| h.width().max(h.embed + 1));
     let rest = [c.vae.width * c.vae.mlp.max(3), features, 4 * c.audio.features, c.vae.latent, c.flow.tau_width];
-    flow.into_iter().chain(rest).fold(0, usize::max)
+    flow.into_iter().chain(rest).fold(sound, usize::max)
 }
 
 /// The idle clip, as bundles hold it: exported ones its frames, quantised ones the latents that the

@@ -1,19 +1,30 @@
 //! What a token is told.
 
+use crate::config::{Config, HearingConfig};
+
 /// Where each modality lies in a [`Condition`]'s values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ConditionLayout {
     /// Width of the audio features of one frame.
     pub audio_features: usize,
+    /// Length of the sound vector; 0 of a bundle without hearing.
+    pub sound: usize,
 }
 
 impl ConditionLayout {
     const USER: usize = 8;
     const GAZE: usize = 4;
 
-    /// Number of values: 4 x 2 user positions, 4 frames of features of each voice, 4 gaze scores.
+    /// That of a bundle.
+    pub fn of(config: &Config) -> Self {
+        let sound = config.hearing.as_ref().map_or(0, HearingConfig::width);
+        Self { audio_features: config.audio.features, sound }
+    }
+
+    /// Number of values: 4 x 2 user positions, 4 frames of features of each voice, 4 gaze scores,
+    /// the sound vector.
     pub fn width(&self) -> usize {
-        Self::USER + 8 * self.audio_features + Self::GAZE
+        self.gaze().end + self.sound
     }
 
     pub(super) fn user(&self) -> std::ops::Range<usize> {
@@ -30,7 +41,12 @@ impl ConditionLayout {
     }
 
     pub(super) fn gaze(&self) -> std::ops::Range<usize> {
-        self.width() - Self::GAZE..self.width()
+        let start = self.user_voice().end;
+        start..start + Self::GAZE
+    }
+
+    pub(super) fn sound(&self) -> std::ops::Range<usize> {
+        self.gaze().end..self.width()
     }
 }
 
@@ -44,6 +60,8 @@ pub struct Condition {
     pub(super) values: Vec<f32>,
     /// Presence of the user's position, the agent's voice, the user's voice and the gaze target.
     pub(super) present: [bool; 4],
+    /// Whether sounds in the room are listened to.
+    pub(super) hears: bool,
     /// Whether the gaze target is guided towards, by a branch of its own.
     pub(super) guided: bool,
 }
@@ -51,12 +69,12 @@ pub struct Condition {
 impl Condition {
     /// Everything absent.
     pub fn absent(layout: ConditionLayout) -> Self {
-        Self { layout, values: vec![0.0; layout.width()], present: [false; 4], guided: false }
+        Self { layout, values: vec![0.0; layout.width()], present: [false; 4], hears: false, guided: false }
     }
 
     /// Makes everything absent again.
     pub fn clear(&mut self) {
-        (self.present, self.guided) = ([false; 4], false);
+        (self.present, self.hears, self.guided) = ([false; 4], false, false);
     }
 
     /// The user's floor positions `(x, z)` over four frames in the agent's frame, metres.
@@ -85,6 +103,12 @@ impl Condition {
         (self.present[3], self.guided) = (true, guided);
     }
 
+    /// The sound vector, `[S]`; of a bundle without hearing there is none.
+    pub fn set_sound(&mut self, vector: &[f32]) {
+        self.values[self.layout.sound()].copy_from_slice(vector);
+        self.hears = true;
+    }
+
     /// Whether a gaze target is guided towards, so that the reference network has a third branch to
     /// run.
     pub fn guides_gaze(&self) -> bool {
@@ -94,7 +118,7 @@ impl Condition {
     pub(super) fn copy_from(&mut self, other: &Self) {
         debug_assert_eq!(self.layout, other.layout);
         self.values.copy_from_slice(&other.values);
-        (self.present, self.guided) = (other.present, other.guided);
+        (self.present, self.hears, self.guided) = (other.present, other.hears, other.guided);
     }
 
     pub(super) fn layout(&self) -> ConditionLayout {

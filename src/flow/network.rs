@@ -3,7 +3,7 @@
 use super::modulation::{Modulation, Modulator};
 use super::{Condition, ConditionLayout};
 use crate::bundle::Tensors;
-use crate::config::FlowConfig;
+use crate::config::{Config, FlowConfig};
 use crate::error::Result;
 use crate::kernels::{Epilogue, Exec, Kernels, Matrix, WeightData, Weights};
 use crate::nn::{Layer, Pass, Rope, Sizes};
@@ -27,10 +27,19 @@ pub struct FlowNet {
     embed_agent_voice: Matrix,
     embed_user_voice: Matrix,
     embed_gaze: Matrix,
+    sound: Option<Sound>,
     layers: Vec<Layer>,
     out: Matrix,
     rope: Rope,
     modulator: Modulator,
+}
+
+/// The way in of the sound vector.
+#[derive(Debug)]
+struct Sound {
+    embed: (Matrix, Matrix),
+    /// Of the embedding and a one, `[d, E + 1]`.
+    input: Matrix,
 }
 
 impl FlowNet {
@@ -42,15 +51,22 @@ impl FlowNet {
     pub fn load(
         t: &Tensors<'_>,
         kernels: Kernels,
-        c: &FlowConfig,
-        latent: usize,
+        config: &Config,
         layout: ConditionLayout,
         prefix: &str,
         times: Option<&[f32]>,
     ) -> Result<Self> {
+        let (c, latent) = (&config.flow, config.vae.latent);
         let (d, mlp) = (c.width, c.width * c.mlp);
         let name = |part: &str| format!("{prefix}.{part}");
         let linear = |part: &str, outputs, inputs| t.linear(kernels, &name(part), outputs, &[inputs]);
+        let sound = |e: usize| -> Result<Sound> {
+            let input = name("input_sound");
+            Ok(Sound {
+                embed: (linear("embed_sound.0", e, layout.sound)?, linear("embed_sound.2", e, e)?),
+                input: t.weights(&input, d, &[e + 1])?.pack(kernels, &input, None),
+            })
+        };
         let layer = |i: usize| -> Result<Layer> {
             let linear = |part: &str, outputs, inputs| linear(&format!("layers.{i}.{part}"), outputs, inputs);
             Ok(Layer {
@@ -86,6 +102,7 @@ impl FlowNet {
             embed_agent_voice: linear("embed_agent", c.embed_voice, 4 * layout.audio_features)?,
             embed_user_voice: linear("embed_voice", c.embed_voice, 4 * layout.audio_features)?,
             embed_gaze: linear("embed_gaze", c.embed_gaze, 4)?,
+            sound: config.hearing.as_ref().map(|h| sound(h.embed)).transpose()?,
             layers: (0..c.layers).map(layer).collect::<Result<_>>()?,
             out: linear("final.out", latent, d)?,
             rope: Rope::new(d / c.heads),
@@ -120,7 +137,8 @@ impl FlowNet {
     /// Bytes of the packed matrices that a block reads once, to embed its conditioning.
     pub fn condition_bytes(&self) -> usize {
         let embeds = [&self.embed_user.0, &self.embed_user.1, &self.embed_agent_voice, &self.embed_user_voice];
-        embeds.into_iter().chain([&self.embed_gaze, &self.input_rest]).map(Matrix::bytes).sum()
+        let sound = self.sound.iter().flat_map(|s| [&s.embed.0, &s.embed.1, &s.input]);
+        embeds.into_iter().chain([&self.embed_gaze, &self.input_rest]).chain(sound).map(Matrix::bytes).sum()
     }
 
     /// Bytes of what flow times are turned into modulation with, read when a session starts: packed
@@ -139,9 +157,16 @@ impl FlowNet {
         self.latent
     }
 
-    /// Width of the embedded conditioning that [`FlowNet::project`] needs as scratch.
-    pub(super) fn rest_width(&self) -> usize {
+    /// Width of the embedded conditioning.
+    fn rest_width(&self) -> usize {
         self.input_rest.in_features()
+    }
+
+    /// Floats that [`FlowNet::project`] needs as scratch.
+    pub(super) fn scratch(&self) -> usize {
+        // An embedding's hidden layer, itself and a one, and what it adds to the input.
+        let sound = self.sound.as_ref().map_or(0, |s| 2 * s.input.in_features() + self.config.width);
+        sound.max(2 * self.rest_width())
     }
 
     /// The input of a token with everything absent, without the latent's part: `[d]`.
@@ -155,13 +180,14 @@ impl FlowNet {
     }
 
     /// Input of a token's conditioning, `out` `[2, d]`: without a guided gaze target, and with it
-    /// (the same if there is none, or if it is not guided towards). `embedded` is scratch of `2 x
-    /// rest_width`.
-    pub(super) fn project(&self, exec: &mut Exec, condition: &Condition, embedded: &mut [f32], out: &mut [f32]) {
+    /// (the same if there is none, or if it is not guided towards). `scratch` has
+    /// [`FlowNet::scratch`] floats.
+    pub(super) fn project(&self, exec: &mut Exec, condition: &Condition, scratch: &mut [f32], out: &mut [f32]) {
         let (c, rest) = (&self.config, self.rest_width());
         let layout = condition.layout();
         debug_assert_eq!(layout, self.layout);
         let [user, agent, voice, gaze] = condition.present;
+        let embedded = &mut scratch[..2 * rest];
         let (row, with) = embedded.split_at_mut(rest);
         row.fill(0.0);
         let (e_user, tail) = row.split_at_mut(c.embed_user);
@@ -196,6 +222,9 @@ impl FlowNet {
         }
         with[rest - 1] = f32::from(u8::from(gaze));
         exec.linear(&self.input_rest, embedded, 2, out, Epilogue::Store);
+        if let Some(sound) = self.sound.as_ref().filter(|_| condition.hears) {
+            sound.add(exec, &condition.values[layout.sound()], scratch, out);
+        }
     }
 
     /// Modulation of the given flow times.
@@ -205,5 +234,22 @@ impl FlowNet {
     /// not the times of the table in their place.
     pub fn modulation(&self, exec: &mut Exec, times: &[f32]) -> Result<Arc<Modulation>> {
         self.modulator.modulation(exec, &self.config, times)
+    }
+}
+
+impl Sound {
+    /// Adds the vector's embedding to each row of `out`.
+    fn add(&self, exec: &mut Exec, vector: &[f32], scratch: &mut [f32], out: &mut [f32]) {
+        let (embed, width) = (self.embed.1.out_features(), self.input.out_features());
+        let (hidden, rest) = scratch.split_at_mut(embed);
+        let (e, rest) = rest.split_at_mut(embed + 1);
+        exec.linear(&self.embed.0, vector, 1, hidden, Epilogue::Gelu);
+        exec.linear(&self.embed.1, hidden, 1, &mut e[..embed], Epilogue::Store);
+        e[embed] = 1.0;
+        let added = &mut rest[..width];
+        exec.linear(&self.input, e, 1, added, Epilogue::Store);
+        for row in out.chunks_exact_mut(width) {
+            row.iter_mut().zip(&*added).for_each(|(x, a)| *x += a);
+        }
     }
 }

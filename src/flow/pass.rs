@@ -56,7 +56,7 @@ impl Work {
             pass: net.pass(ROWS),
             z: vec![0.0; tokens * net.latent()],
             z_in: vec![0.0; tokens * net.config().width],
-            embedded: vec![0.0; 2 * net.rest_width()],
+            embedded: vec![0.0; net.scratch()],
             out: vec![0.0; SHARED_ROWS * net.latent()],
         }
     }

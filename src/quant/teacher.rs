@@ -135,7 +135,8 @@ impl Teacher {
     /// guidance, temperature).
     pub fn compare(&self, candidate: &Arc<Engine>) -> Result<Forced> {
         let (a, b) = (self.engine.config(), candidate.config());
-        if (&a.rig, a.vae, a.flow, &a.dram, &a.audio) != (&b.rig, b.vae, b.flow, &b.dram, &b.audio) {
+        let sizes = (&a.rig, a.vae, a.flow, &a.dram, &a.audio, &a.hearing);
+        if sizes != (&b.rig, b.vae, b.flow, &b.dram, &b.audio, &b.hearing) {
             return Err(argument("the candidate is not made from the reference: rig or sizes differ".to_owned()));
         }
         if (&a.session, &a.gaze) != (&b.session, &b.gaze) {

@@ -2,7 +2,7 @@
 
 use super::SessionOptions;
 use super::governor::{Hold, Plan};
-use super::inputs::Listening;
+use super::inputs::{LISTENERS, Listening};
 use super::maker::Maker;
 use super::probe::{Probe, tell};
 use super::state::BlockState;
@@ -40,9 +40,11 @@ impl Block<'_> {
         self.plan.hold == Hold::No && self.outcome.is_ok()
     }
 
-    /// The voices, to listen for it.
-    pub(super) fn voices(&mut self) -> [Listening<'_>; 2] {
-        self.state.inputs.voice_inputs(self.state.block)
+    /// What is to listen for it.
+    pub(super) fn listening(&mut self) -> [Listening<'_>; LISTENERS] {
+        let BlockState { inputs, frames, head, block, .. } = &mut *self.state;
+        // The frames are those of the block before.
+        inputs.listening(*block, std::array::from_fn(|i| frames[i].global[*head]))
     }
 
     /// Its generator of latents, if it has one.
@@ -93,7 +95,7 @@ impl Block<'_> {
             Maker::Latent(maker) => {
                 let gaze = engine.config.gaze.as_ref();
                 let gaze = options.diagnostics.gaze_control.cue(gaze, options.gaze, plan.sampler, options.seed, *block);
-                self.outcome = inputs.prepare(*block, &root, gaze, probe);
+                self.outcome = inputs.prepare(*block, &root, gaze, options.sensitivity, probe);
                 if self.outcome.is_err() {
                     return;
                 }

@@ -1,6 +1,6 @@
 //! Settings of a session from threads that do not own it.
 
-use super::options::{check_block_time, check_gaze, check_guidance, unsupported};
+use super::options::{check_block_time, check_gaze, check_guidance, check_sensitivity, unsupported};
 use super::{Governor, Session};
 use crate::engine::Engine;
 use crate::error::Result;
@@ -26,6 +26,8 @@ struct Pending {
     gaze: Setting,
     /// Bits of both weights.
     guidance: Setting,
+    /// Bits of the sensitivity.
+    sensitivity: Setting,
     /// Place among `samplers`.
     sampler: Setting,
     /// Bits of the milliseconds.
@@ -74,6 +76,7 @@ impl Controls {
         let pending = Pending {
             gaze: Setting::new(),
             guidance: Setting::new(),
+            sensitivity: Setting::new(),
             sampler: Setting::new(),
             budget: Setting::new(),
             block_time: Setting::new(),
@@ -100,6 +103,16 @@ impl Controls {
         check_guidance(weight)?;
         check_guidance(gaze)?;
         self.pending.guidance.set(u64::from(weight.to_bits()) << 32 | u64::from(gaze.to_bits()));
+        Ok(())
+    }
+
+    /// As [`Session::set_sensitivity`].
+    ///
+    /// # Errors
+    /// As [`Session::set_sensitivity`].
+    pub fn set_sensitivity(&self, sensitivity: f32) -> Result<()> {
+        check_sensitivity(sensitivity)?;
+        self.pending.sensitivity.set(u64::from(sensitivity.to_bits()));
         Ok(())
     }
 
@@ -149,6 +162,10 @@ impl Controls {
         self.pending.guidance.take();
     }
 
+    pub(super) fn settle_sensitivity(&self) {
+        self.pending.sensitivity.take();
+    }
+
     pub(super) fn settle_sampler(&self) {
         self.pending.sampler.take();
     }
@@ -177,6 +194,9 @@ impl Session {
         if let Some(word) = pending.guidance.take() {
             let weights = (f32::from_bits((word >> 32) as u32), f32::from_bits(word as u32));
             (self.options.guidance, self.options.gaze_guidance) = (Some(weights.0), Some(weights.1));
+        }
+        if let Some(word) = pending.sensitivity.take() {
+            self.options.sensitivity = f32::from_bits(word as u32);
         }
         if let Some(place) = pending.sampler.take() {
             self.apply_sampler(pending.samplers[place as usize]);

@@ -91,5 +91,7 @@ impl Session {
             maker.state.clone_from(step);
         }
         state.motion.clone_from(&block.motion);
+        // What is heard is heard at the head that was shown.
+        state.frames.clone_from(&block.frames);
     }
 }

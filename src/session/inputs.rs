@@ -11,16 +11,20 @@ use crate::dram::Seen;
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::flow::Condition;
-use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES, FPS, Root};
+use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES, FPS, Root, Transform};
+use crate::hearing::{Hearing, SoundInput};
 use crate::kernels::Exec;
 use crate::session::SessionOptions;
 use crate::user::{HeadInput, HeadTrack, Presence, UserSample};
 use glam::Vec3;
 
+/// Who listens for a block: two voices and the agent's ears.
+pub(super) const LISTENERS: usize = 3;
+
 /// A voice and the encoder that listens to it.
 pub(super) struct EncodedVoice {
     voice: Voice,
-    encoder: Hearing,
+    encoder: Encoder,
     samples: Box<[f32; BLOCK_SAMPLES]>,
     features: Vec<f32>,
     /// Whether `features` are those of the next block.
@@ -34,13 +38,13 @@ pub(super) struct EncodedVoice {
 }
 
 /// The audio encoder on either backend.
-enum Hearing {
+enum Encoder {
     Kernels(AudioEncoder),
     #[cfg(feature = "tract")]
     Tract(TractEncoder),
 }
 
-impl Hearing {
+impl Encoder {
     fn new(engine: &Engine, backend: AudioBackend) -> Result<Self> {
         Ok(match backend {
             AudioBackend::Kernels => Self::Kernels(AudioEncoder::new(&engine.config.audio)?),
@@ -91,6 +95,8 @@ impl Ear {
 pub(super) struct Inputs {
     agent: EncodedVoice,
     user: EncodedVoice,
+    /// Where the bundle has hearing.
+    hearing: Option<Box<Hearing>>,
     head: HeadInput,
     track: HeadTrack,
     user_delay: u64,
@@ -101,7 +107,7 @@ impl EncodedVoice {
     fn new(engine: &Engine, options: &SessionOptions, delay: u32) -> Result<Self> {
         Ok(Self {
             voice: Voice::with_capacity(options.voice_ahead),
-            encoder: Hearing::new(engine, options.diagnostics.audio)?,
+            encoder: Encoder::new(engine, options.diagnostics.audio)?,
             samples: Box::new([0.0; BLOCK_SAMPLES]),
             features: vec![0.0; BLOCK_FRAMES * engine.config.audio.features],
             heard: Ok(false),
@@ -166,24 +172,47 @@ impl EncodedVoice {
     }
 }
 
-/// A voice and the block that it listens for.
-pub(super) type Listening<'a> = Option<(u64, &'a mut EncodedVoice)>;
+/// What listens, for which block.
+pub(super) enum Listening<'a> {
+    /// A voice.
+    Voice(u64, &'a mut EncodedVoice),
+    /// The agent's ears, to the block before, in whose frames the head joint was there.
+    Room(u64, &'a mut Hearing, [Transform; BLOCK_FRAMES]),
+    /// Nobody.
+    Nobody,
+}
+
+impl Listening<'_> {
+    /// Whether there is anything to hear.
+    fn hears(&self) -> bool {
+        match self {
+            Self::Voice(block, voice) => voice.voice.is_present() && voice.known(*block).is_some(),
+            Self::Room(_, hearing, _) => hearing.is_present(),
+            Self::Nobody => false,
+        }
+    }
+
+    fn listen(&mut self, exec: &mut Exec, engine: &Engine) {
+        match self {
+            Self::Voice(block, voice) => voice.heard = voice.listen(exec, engine, *block),
+            Self::Room(block, hearing, heads) => {
+                if let Some(weights) = &engine.hearing {
+                    hearing.listen(exec, weights, *block, heads);
+                }
+            }
+            Self::Nobody => {}
+        }
+    }
+}
 
 /// Lets all of `inputs`, of any sessions, listen: side by side where more than one has something to
 /// hear.
 pub(super) fn listen(exec: &mut Exec, engine: &Engine, inputs: &mut [Listening<'_>]) {
-    let hears = |(block, input): &&(u64, &mut EncodedVoice)| input.voice.is_present() && input.known(*block).is_some();
-    let several = inputs.iter().flatten().filter(hears).count() > 1;
-    let listen = |exec: &mut Exec, input: &mut Listening<'_>| {
-        if let Some((block, input)) = input {
-            input.heard = input.listen(exec, engine, *block);
-        }
-    };
-    if several {
-        exec.each(inputs, listen);
+    if inputs.iter().filter(|input| input.hears()).count() > 1 {
+        exec.each(inputs, |exec, input| input.listen(exec, engine));
     } else {
-        // One voice by itself has both threads in each of its layers.
-        inputs.iter_mut().for_each(|input| listen(exec, input));
+        // One by itself has both threads in each of its layers.
+        inputs.iter_mut().for_each(|input| input.listen(exec, engine));
     }
 }
 
@@ -192,6 +221,7 @@ impl Inputs {
         Ok(Self {
             agent: EncodedVoice::new(engine, options, engine.config.agent_delay_blocks)?,
             user: EncodedVoice::new(engine, options, engine.config.user_delay_blocks)?,
+            hearing: engine.config.hearing.as_ref().map(|h| Hearing::new(h).map(Box::new)).transpose()?,
             head: HeadInput::new(),
             track: HeadTrack::new(),
             user_delay: u64::from(engine.config.user_delay_blocks),
@@ -203,6 +233,7 @@ impl Inputs {
     pub(super) fn reset(&mut self, first: u64) {
         self.agent.reset(first);
         self.user.reset(first);
+        self.hearing.iter_mut().for_each(|hearing| hearing.reset());
         self.head.reset();
         self.track.reset();
         self.condition.clear();
@@ -211,7 +242,16 @@ impl Inputs {
     /// Lets `block` go by: nobody listens.
     pub(super) fn skip(&mut self, block: u64) -> Result<()> {
         self.agent.skip(block)?;
-        self.user.skip(block)
+        self.user.skip(block)?;
+        self.skip_sounds(block);
+        Ok(())
+    }
+
+    /// Lets the sounds that `block` may know go by unheard.
+    fn skip_sounds(&mut self, block: u64) {
+        if let (Some(hearing), Some(known)) = (&mut self.hearing, self.user.known(block)) {
+            hearing.skip(known);
+        }
     }
 
     /// Lets `ears` of `engine` listen for `block`, to the agent's voice and the user's; returns
@@ -223,6 +263,7 @@ impl Inputs {
         block: u64,
         [agent, user]: &mut [Ear; 2],
     ) -> Result<[bool; 2]> {
+        self.skip_sounds(block);
         Ok([self.agent.lend(exec, engine, block, agent)?, self.user.lend(exec, engine, block, user)?])
     }
 
@@ -241,6 +282,17 @@ impl Inputs {
         }
     }
 
+    /// Takes notice of sounds in the room; `block` is due, with the agent at `root`. A sound that is
+    /// new begins with that block.
+    pub(super) fn look_for_sounds(&mut self, block: u64, root: &Root) {
+        self.hearing.iter_mut().for_each(|hearing| hearing.begin(block, root));
+    }
+
+    /// The input of sounds in the room.
+    pub(super) fn sounds(&self) -> SoundInput {
+        self.hearing.as_ref().map_or_else(SoundInput::deaf, |hearing| hearing.input())
+    }
+
     pub(super) fn head(&self) -> &HeadInput {
         &self.head
     }
@@ -252,9 +304,14 @@ impl Inputs {
         known(self.track.sample(frame as f64 / f64::from(FPS), start))
     }
 
-    /// The voices, to [`listen`] for `block`.
-    pub(super) fn voice_inputs(&mut self, block: u64) -> [Listening<'_>; 2] {
-        [Some((block, &mut self.agent)), Some((block, &mut self.user))]
+    /// What is to [`listen`] for `block`; the head joint was at `heads` in the frames before it.
+    pub(super) fn listening(&mut self, block: u64, heads: [Transform; BLOCK_FRAMES]) -> [Listening<'_>; LISTENERS] {
+        let known = self.user.known(block);
+        let room = match (&mut self.hearing, known) {
+            (Some(hearing), Some(known)) => Listening::Room(known, hearing, heads),
+            _ => Listening::Nobody,
+        };
+        [Listening::Voice(block, &mut self.agent), Listening::Voice(block, &mut self.user), room]
     }
 
     /// Makes the conditioning of `block`, for which voices have listened, with the agent's root at
@@ -264,6 +321,7 @@ impl Inputs {
         block: u64,
         root: &Root,
         gaze: Option<Cue>,
+        sensitivity: f32,
         probe: &mut Option<&mut dyn Probe>,
     ) -> Result<()> {
         self.condition.clear();
@@ -278,6 +336,13 @@ impl Inputs {
         if let Some(positions) = self.user_in_agent_frame(block, root) {
             self.condition.set_user(&positions);
             tell(probe, block, "conditioning.user", &positions);
+        }
+        if let Some(hearing) = self.hearing.as_mut().filter(|hearing| hearing.has_heard()) {
+            let vector = hearing.vector(root, sensitivity);
+            self.condition.set_sound(vector);
+            tell(probe, block, "conditioning.sound", vector);
+            tell(probe, block, "hearing.ears", hearing.ears());
+            tell(probe, block, "hearing.features", hearing.features());
         }
         if let Some(Cue { value, guided }) = gaze {
             self.condition.set_gaze(value, guided);
@@ -330,6 +395,7 @@ impl Inputs {
             agent_voice: self.agent.voice.stats(),
             user_voice: self.user.voice.stats(),
             head: self.head.stats(&self.track),
+            sounds: self.hearing.as_ref().map_or_else(Default::default, |hearing| hearing.stats()),
         }
     }
 

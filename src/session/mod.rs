@@ -1,7 +1,7 @@
 //! Sessions: one conversation with one user. The one place that knows all stages.
 //!
 //! ```text
-//! push audio, head -> inputs -> condition -> generator -> latent -> decoder -> features -> motion -> frames -> poll
+//! push audio, head, sounds -> inputs -> condition -> generator -> latent -> decoder -> features -> motion -> frames -> poll
 //! ```
 //!
 //! | file | what |
@@ -12,7 +12,7 @@
 //! | `controls` | settings from other threads |
 //! | `shared` | a session, its inputs and its controls, for several threads |
 //! | `diagnostics` | what measurements and tests change about it |
-//! | `inputs` | voices and head positions to the conditioning of a block |
+//! | `inputs` | voices, head positions and sounds to the conditioning of a block |
 //! | `gaze` | the wanted gaze to the gaze channel, free gaze included |
 //! | `state` | all that changes from block to block |
 //! | `maker` | what makes the poses, by the bundle's kind |
@@ -31,7 +31,7 @@
 //! | `probe` | every stage of a block, for whoever wants to check the maths |
 //!
 //! Inputs and settings may come from any thread while a block is computed ([`VoiceInput`],
-//! [`HeadInput`], [`Controls`]): nobody waits for the block, and a block goes by what was there
+//! [`HeadInput`], [`SoundInput`], [`Controls`]): nobody waits for the block, and a block goes by what was there
 //! when its poll began.
 //!
 //! After [`Session::poll`] has been called once, computing a block allocates nothing, takes no lock
@@ -79,6 +79,7 @@ use crate::audio::{Speaker, VoiceInput};
 use crate::engine::Engine;
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::Frame;
+use crate::hearing::SoundInput;
 use crate::kernels::Exec;
 use crate::user::HeadInput;
 use glam::{Quat, Vec3};
@@ -214,6 +215,34 @@ impl Session {
         self.state.inputs.head().push_pose(position, rotation, time);
         self.state.inputs.look();
         Ok(())
+    }
+
+    /// Pushes a piece of what source `id` in the room gives off: mono `samples` of `rate` Hz, pascals
+    /// as they are 1 m from it (RMS 1 is 94 dB SPL); from now on it is at `position`, world metres.
+    /// The same as [`SoundInput::push`] of [`Session::sounds`], which says more.
+    ///
+    /// What is pushed before the poll of a block sounds from that block's start on; the agent answers
+    /// with the block after it. Until the first push the agent is as one of a bundle without hearing, to
+    /// the bit.
+    ///
+    /// # Errors
+    /// As [`SoundInput::push`]: [`ErrorKind::Argument`] where the bundle has no hearing, or for a
+    /// position that is no number; [`ErrorKind::Audio`] for a bad rate or samples that are not finite.
+    pub fn push_sound(&mut self, id: u32, samples: &[f32], rate: u32, position: Vec3) -> Result<()> {
+        self.state.inputs.sounds().push(id, samples, rate, position)
+    }
+
+    /// Stops source `id` at once. The same as [`SoundInput::end`] of [`Session::sounds`].
+    ///
+    /// # Errors
+    /// As [`SoundInput::end`].
+    pub fn end_sound(&mut self, id: u32) -> Result<()> {
+        self.state.inputs.sounds().end(id)
+    }
+
+    /// The input of sounds in the room, for the threads that have them.
+    pub fn sounds(&self) -> SoundInput {
+        self.state.inputs.sounds()
     }
 
     /// A voice's input, for the thread that has its sound: to push, to end an utterance, to break

@@ -40,6 +40,9 @@ pub struct SessionOptions {
     /// Scale of the noise that blocks start from, 0 to 2; `None` for the bundle's. Less gives
     /// calmer motion.
     pub temperature: Option<f32>,
+    /// How readily the agent reacts to sounds in the room: -1 dull, 0 neutral, 1 sensitive; numbers
+    /// between, and up to 1.5 either way. Bundles without hearing do not go by it.
+    pub sensitivity: f32,
     /// Where the agent stands at the start, in the caller's world.
     pub start: Root,
     /// Whether the root's steps are corrected so that planted feet stay where they are.
@@ -68,6 +71,7 @@ impl Default for SessionOptions {
             guidance: None,
             gaze_guidance: None,
             temperature: None,
+            sensitivity: 0.0,
             start: Root::default(),
             stance: true,
             guard: true,
@@ -84,6 +88,7 @@ impl SessionOptions {
         if let Some(t) = self.temperature.filter(|t| !(0.0..=2.0).contains(t)) {
             return Err(argument(format!("temperature {t}: 0 to 2")));
         }
+        check_sensitivity(self.sensitivity)?;
         if !matches!(self.threads, 1 | 2) {
             return Err(argument(format!("threads is {}: 1 or 2", self.threads)));
         }
@@ -130,6 +135,13 @@ pub(super) fn check_gaze(target: Option<f32>) -> Result<()> {
         Some(g) if !(-1.0..=1.0).contains(&g) => Err(argument(format!("gaze target {g}: -1 to 1, or none"))),
         _ => Ok(()),
     }
+}
+
+pub(super) fn check_sensitivity(sensitivity: f32) -> Result<()> {
+    if sensitivity.abs() <= 1.5 {
+        return Ok(());
+    }
+    Err(argument(format!("sensitivity {sensitivity}: -1 (dull) to 1 (sensitive), at most 1.5 either way")))
 }
 
 pub(super) fn check_guidance(weight: f32) -> Result<()> {

@@ -10,7 +10,7 @@
 //! them alone goes to one thread.
 
 use super::block::{Block, Posing};
-use super::inputs::{Listening, listen};
+use super::inputs::{LISTENERS, Listening, listen};
 use super::tools::{DramTools, Kit, SarahTools, Tools};
 use crate::flow::{SHARED_ROWS, sample};
 use crate::frame::BLOCK_FRAMES;
@@ -77,15 +77,16 @@ fn moving<'a, 'b>(block: &'a mut Option<Block<'b>>) -> Option<&'a mut Block<'b>>
     block.as_mut().filter(|block| block.moves())
 }
 
-/// All voices listen.
+/// Voices are listened to, and the rooms.
 fn hear(tools: &mut Tools<'_>, blocks: &mut [Option<Block<'_>>]) {
-    let mut voices: [[Listening<'_>; 2]; MEMBERS] = [const { [const { None }; 2] }; MEMBERS];
+    let mut inputs: [[Listening<'_>; LISTENERS]; MEMBERS] =
+        [const { [const { Listening::Nobody }; LISTENERS] }; MEMBERS];
     let mut count = 0;
     for block in blocks.iter_mut().filter_map(moving) {
-        voices[count] = block.voices();
+        inputs[count] = block.listening();
         count += 1;
     }
-    listen(tools.exec, tools.engine, voices[..count].as_flattened_mut());
+    listen(tools.exec, tools.engine, inputs[..count].as_flattened_mut());
 }
 
 /// What was decoded becomes frames; returns the number of blocks.

@@ -70,8 +70,10 @@ impl Session {
         Ok(())
     }
 
-    /// Decides about the next block: its plan and its work.
+    /// Decides about the next block, which is due: its plan and its work.
     pub(super) fn start(&mut self) -> (Plan, f64) {
+        let root = self.state.motion.root();
+        self.state.inputs.look_for_sounds(self.state.block, &root);
         let (plan, work) = self.plan();
         self.log.record(self.state.block, plan);
         (plan, work)

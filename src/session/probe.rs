@@ -8,6 +8,9 @@ use crate::frame::Frame;
 /// |---|---|
 /// | `agent_features`, `user_features` | `[4, audio features]`, absent voices left out |
 /// | `conditioning.user` | `[8]` metres in the agent's frame, left out while unknown |
+/// | `conditioning.sound` | `[S]`, left out before the first sound |
+/// | `hearing.ears` | `[2, 3200]` pascals at the left and the right ear in the block before, likewise |
+/// | `hearing.features` | `[4, hearing features]`, likewise |
 /// | `x1` | `[branches, latent]`, once per evaluation |
 /// | `latents` | `[latent]`, standardised |
 /// | `decoded` | `[4, features]`, standardised, left out where the latent was not usable |

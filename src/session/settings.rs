@@ -47,6 +47,18 @@ impl Session {
         Ok(())
     }
 
+    /// Sets how readily the agent reacts to sounds in the room, from the next block on
+    /// ([`SessionOptions::sensitivity`](crate::SessionOptions::sensitivity)).
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] beyond 1.5 either way.
+    pub fn set_sensitivity(&mut self, sensitivity: f32) -> Result<()> {
+        options::check_sensitivity(sensitivity)?;
+        self.controls.settle_sensitivity();
+        self.options.sensitivity = sensitivity;
+        Ok(())
+    }
+
     /// Sets the sampler from the next block on; with a governor, the best one that it uses. Without
     /// one, flow times that were not visited lately catch up in batched passes within that block.
     ///

@@ -2,6 +2,7 @@
 
 use super::{Controls, Session};
 use crate::audio::{Speaker, VoiceInput};
+use crate::hearing::SoundInput;
 use crate::user::HeadInput;
 use std::sync::{LockResult, Mutex, MutexGuard, TryLockResult};
 
@@ -18,6 +19,7 @@ pub struct SharedSession {
     agent: VoiceInput,
     user: VoiceInput,
     head: HeadInput,
+    sounds: SoundInput,
     controls: Controls,
 }
 
@@ -28,6 +30,7 @@ impl SharedSession {
             agent: session.voice_input(Speaker::Agent),
             user: session.voice_input(Speaker::User),
             head: session.head_input(),
+            sounds: session.sounds(),
             controls: session.controls(),
             session: Mutex::new(session),
         }
@@ -44,6 +47,11 @@ impl SharedSession {
     /// The input of the user's head.
     pub fn head(&self) -> &HeadInput {
         &self.head
+    }
+
+    /// The input of sounds in the room.
+    pub fn sounds(&self) -> &SoundInput {
+        &self.sounds
     }
 
     /// The settings.

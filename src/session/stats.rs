@@ -2,6 +2,7 @@
 
 use super::GovernorStats;
 use crate::audio::VoiceStats;
+use crate::hearing::SoundStats;
 use crate::pose::GuardStats;
 use crate::user::TrackStats;
 use std::time::Duration;
@@ -55,6 +56,8 @@ pub struct InputStats {
     pub user_voice: VoiceStats,
     /// The user's head.
     pub head: TrackStats,
+    /// Sounds in the room; zeros where the bundle has no hearing.
+    pub sounds: SoundStats,
 }
 
 /// The last block times.

@@ -182,3 +182,95 @@ pub fn motion_of(engine: &Arc<Engine>, options: SessionOptions, inputs: &Inputs,
 pub fn block_seconds(blocks: usize) -> f64 {
     (blocks * BLOCK_FRAMES) as f64 / f64::from(FPS)
 }
+
+/// Features of the hearing of [`hearing_bytes`], and the width of its embedding.
+pub const HEARING: (usize, usize) = (6, 8);
+
+/// The tiny bundle with hearing of random weights; all else is the tiny bundle's.
+pub fn hearing_bytes() -> Vec<u8> {
+    with_hearing(&std::fs::read(golden_path("tiny.safetensors")).expect("the tiny bundle is there"))
+}
+
+/// An engine of [`hearing_bytes`].
+pub fn hearing() -> Arc<Engine> {
+    Engine::from_bytes(hearing_bytes(), "tiny with hearing").expect("it loads")
+}
+
+/// The same in f32, then with all matrices at `scheme` that can be.
+pub fn hearing_in(scheme: Scheme) -> Arc<Engine> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("hearing-{scheme}-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let path = folder.join("tiny.safetensors");
+    std::fs::write(&path, hearing_bytes()).expect("a file");
+    let file = widened(&path);
+    let options = Options { scheme, smallest: 0, keep: &[], calibration: None, budget: None };
+    let quantised = quantise(&file, &options).expect("it can be quantised");
+    std::fs::remove_dir_all(&folder).expect("it is ours");
+    Engine::from_bytes(quantised.bytes, "tiny with hearing").expect("the result loads")
+}
+
+/// A bundle with hearing, of random weights, put into one without.
+fn with_hearing(bytes: &[u8]) -> Vec<u8> {
+    let (_, header) = SafeTensors::read_metadata(bytes).expect("a header");
+    let file = SafeTensors::deserialize(bytes).expect("a sound container");
+    let mut metadata = header.metadata().clone().expect("metadata");
+    let mut config: serde_json::Value = serde_json::from_str(&metadata["visavis"]).expect("a config");
+    let (features, embed) = HEARING;
+    let shapes = [(1, 4, 10, 5), (4, 6, 10, 5), (6, 8, 8, 4), (8, 8, 8, 4), (8, 8, 4, 2), (8, 8, 3, 1)];
+    let layers: Vec<_> = shapes
+        .iter()
+        .map(|(inputs, outputs, kernel, stride)| {
+            serde_json::json!({"inputs": inputs, "outputs": outputs, "kernel": kernel, "stride": stride, "residual": *stride == 1})
+        })
+        .collect();
+    config["hearing"] = serde_json::json!({"audio": {"layers": layers, "features": features}, "embed": embed});
+    metadata.insert("visavis".to_owned(), config.to_string());
+    let width = config["flow"]["width"].as_u64().expect("a width") as usize;
+
+    let mut added: Vec<(String, Vec<usize>)> = Vec::new();
+    let mut layer = |name: String, shape: Vec<usize>, bias: bool| {
+        if bias {
+            added.push((format!("{name}.bias"), vec![shape[0]]));
+        }
+        added.push((format!("{name}.weight"), shape));
+    };
+    for (i, (inputs, outputs, kernel, _)) in shapes.into_iter().enumerate() {
+        layer(format!("hearing.conv.{i}"), vec![outputs, kernel, inputs], true);
+    }
+    layer("hearing.out".to_owned(), vec![features, 8], true);
+    for net in ["flow", "student"] {
+        layer(format!("{net}.embed_sound.0"), vec![embed, 4 * features + 14], true);
+        layer(format!("{net}.embed_sound.2"), vec![embed, embed], true);
+        layer(format!("{net}.input_sound"), vec![width, embed + 1], false);
+    }
+    let mut state = 0x9e37_79b9_7f4a_7c15u64;
+    let mut unit = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f32 / (1 << 23) as f32 - 1.0
+    };
+    let mut all: Vec<_> =
+        file.iter().map(|(n, v)| (n.to_owned(), v.dtype(), v.shape().to_vec(), v.data().to_vec())).collect();
+    for (name, shape) in added {
+        let inputs = shape[1..].iter().product::<usize>().max(1);
+        let scale = if name.ends_with("bias") { 0.1 } else { 1.7 / (inputs as f32).sqrt() };
+        let count = shape.iter().product::<usize>();
+        let data: Vec<_> = (0..count).flat_map(|_| (scale * unit()).to_le_bytes()).collect();
+        all.push((name, Dtype::F32, shape, data));
+    }
+    let views = all.iter().map(|(name, dtype, shape, data)| {
+        (name.as_str(), TensorView::new(*dtype, shape.clone(), data).expect("a sound tensor"))
+    });
+    safetensors::serialize(views, Some(metadata)).expect("a bundle")
+}
+
+/// Noise of a seed within +-`loud`.
+pub fn noise(seed: u64, samples: usize, loud: f32) -> Vec<f32> {
+    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    let mut unit = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 40) as f32 / (1 << 23) as f32 - 1.0
+    };
+    (0..samples).map(|_| loud * unit()).collect()
+}

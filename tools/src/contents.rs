@@ -3,7 +3,7 @@
 use serde::Serialize;
 use std::fmt;
 use visavis::internals::bundle::TensorInfo;
-use visavis::internals::config::{Config, DramConfig, LstmConfig, MospaConfig, TcnConfig};
+use visavis::internals::config::{AudioConfig, Config, DramConfig, LstmConfig, MospaConfig, TcnConfig};
 use visavis::internals::kernels::Scheme;
 use visavis::{BundleFile, Engine, Result, Sampler};
 
@@ -19,8 +19,9 @@ pub struct Contents {
 }
 
 /// Parts of a bundle: name prefix and what it is.
-const PARTS: [(&str, &str); 10] = [
+const PARTS: [(&str, &str); 11] = [
     ("audio.", "audio encoder"),
+    ("hearing.", "hearing"),
     ("vae.encoder.", "VAE encoder"),
     ("vae.decoder.", "VAE decoder"),
     ("flow.", "flow transformer"),
@@ -72,13 +73,10 @@ impl fmt::Display for Contents {
             writeln!(f, "  rig      {} joints: {}", c.rig.joints.len(), joint_list(c))?;
             return writeln!(f, "\n  licence  {}", c.licence);
         }
-        let stack: Vec<_> = c.audio.layers.iter().map(|l| format!("{}/{}", l.outputs, l.stride)).collect();
-        writeln!(
-            f,
-            "\n  audio    24 kHz, convolutions (channels/stride) {}, {} features",
-            stack.join(" "),
-            c.audio.features
-        )?;
+        writeln!(f, "\n  audio    24 kHz, {}", encoder(&c.audio))?;
+        if let Some(hearing) = &c.hearing {
+            writeln!(f, "  hearing  two ears, {}, embedded in {}", encoder(&hearing.audio), hearing.embed)?;
+        }
         match &c.dram {
             None => networks(c, f)?,
             Some(dram) => predictors(dram, f)?,
@@ -97,6 +95,11 @@ impl fmt::Display for Contents {
 /// samplers.
 pub fn made_with(engine: &Engine, sampler: Sampler) -> String {
     if engine.needs_sarah().is_ok() { sampler.to_string() } else { engine.kind().to_owned() }
+}
+
+fn encoder(audio: &AudioConfig) -> String {
+    let stack: Vec<_> = audio.layers.iter().map(|l| format!("{}/{}", l.outputs, l.stride)).collect();
+    format!("convolutions (channels/stride) {}, {} features", stack.join(" "), audio.features)
 }
 
 /// The denoiser of the kind `mospa`.

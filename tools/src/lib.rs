@@ -13,6 +13,7 @@
 //! | [`soak`] | one session driven for hours |
 //! | [`mod@bench`] | block times, stages, memory |
 //! | [`react`] | a whole clip of sounds to motion |
+//! | [`room`] | what interrupts the demo's conversation |
 //! | [`serve`] | the live page's folder by the paths of requests |
 //! | [`trace`] | every stage of a session on disk |
 //!
@@ -27,6 +28,7 @@ pub mod offline;
 pub mod react;
 pub mod recording;
 pub mod report;
+pub mod room;
 pub mod serve;
 pub mod soak;
 #[cfg(test)]

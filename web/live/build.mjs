@@ -25,7 +25,7 @@ const esbuild = createRequire(join(tools, "package.json"))("esbuild");
 const stage = join(root, "tools/src/export/viewer/stage");
 const parts = ["math", "shapes", "pose", "face", "mesh", "looks", "shaders", "lines", "webgl"];
 const stageCode = `${parts.map((name) => readFileSync(join(stage, `${name}.js`), "utf8")).join("\n")}
-export { createShapes, createPose, createFace, createWebgl, css, gazeColour, lookRotation, rotate, add, sub, scale, unit, length, mix, clamp, lookAt, multiply, perspective };`;
+export { createShapes, createPose, createFace, createWebgl, css, gazeColour, lookRotation, rotate, add, sub, scale, unit, length, mix, clamp, lookAt, multiply, perspective, sourceLines };`;
 
 const plugin = {
   name: "visavis",
@@ -64,9 +64,9 @@ const configOf = (path) => {
   return JSON.parse(JSON.parse(header.toString()).__metadata__.visavis);
 };
 function model(path) {
-  const { name, kind = "sarah", rig } = configOf(path);
+  const { name, kind = "sarah", rig, hearing } = configOf(path);
   if (JSON.stringify(rig) !== JSON.stringify(configOf(bundles[0]).rig)) throw new Error(`${path} has another rig than ${bundles[0]}: build a page of its own`);
-  return { name, kind };
+  return { name, kind, hears: Boolean(hearing) };
 }
 
 const { rate, names, pieces } = sentences();

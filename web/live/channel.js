@@ -3,6 +3,7 @@
 //   {visavis: "say", samples: Float32Array, rate: Hz}   appended to what the agent says, so that a TTS may send parts as they come
 //   {visavis: "say", file: ArrayBuffer}                 a sound file (WAV, MP3, Ogg: what the browser decodes)
 //   {visavis: "hear", samples, rate}                    appended to the user's voice
+//   {visavis: "sound", name or samples (pascals at 1 m), rate, at: [x, y, z]}    {visavis: "sensitivity", value: -1 to 1}
 //   {visavis: "interrupt"}    {visavis: "gaze", value: 0 to 1, or null: free}    {visavis: "state"}
 // Each is answered to its sender by {visavis: "answer", to, ok, error?, state?}.
 export function createChannel(acts) {

@@ -196,6 +196,40 @@ const checks = {
     claim(d.model === "tiny-lstm" && d.errors === "0", `after that: ${d.model}, ${d.errors} errors`);
     console.log(`     ${d.notice}`);
   },
+  async sounds() { // A model with hearing: sounds are dropped by a click, glow, sound, are heard from their place; one without says so.
+    const two = join(out, "two"), goldens = fileURLToPath(new URL("../../tests/goldens/", import.meta.url));
+    rmSync(two, { recursive: true, force: true });
+    mkdirSync(two);
+    for (const name of ["npm", "build"]) symlinkSync(join(out, name), join(two, name));
+    const bundles = ["hearing", "tiny"].map((name) => join(goldens, `${name}.safetensors`)).join(" ");
+    execFileSync(process.execPath, [fileURLToPath(new URL("build.mjs", import.meta.url)), two], { env: { ...process.env, VISAVIS_BUNDLES: bundles } });
+    await open();
+    const page = await visit(pathToFileURL(join(two, "visavis.html")).href, { hash: "theme=dark&sampler=single&pixels=0.5" });
+    let d = await ready(page);
+    claim(d.hearing === "true" && !(await page.$eval("#room", (e) => e.hidden)), "a model with hearing, but no sounds to drop");
+    await page.click('#sounds button[data-name="music"]');
+    await page.mouse.click(720, 380);
+    d = await until(page, "music in the room", (x) => x.sounding === "music" && x.dropped === "1", 30);
+    const [{ at }] = await page.evaluate(() => window.visavisLive.sounds.shown());
+    claim(at[0] > 0.2 && Math.abs(at[1] - 0.9) < 1e-6, `it is at ${at}`);
+    await sleep(1);
+    await shot(page, "sound");
+    await page.mouse.click(720, 40);
+    await until(page, "not in the sky", (x) => /above the floor/.test(x.notice) && x.dropped === "1", 10);
+    await page.keyboard.press("b");
+    await until(page, "another behind it", (x) => x.dropped === "2", 10);
+    const answer = (message) => page.evaluate((m) => new Promise((done) => { window.addEventListener("message", ({ data }) => data.visavis === "answer" && done(data), { once: false }); window.postMessage(m, "*"); }), message);
+    claim((await answer({ visavis: "sound", name: "bark", at: [1, 0.4, 1] })).ok, "a sound by message");
+    claim(/there are bang/.test((await answer({ visavis: "sound", name: "cow", at: [1, 0.4, 1] })).error), "an unknown sound is not refused");
+    await page.evaluate(() => { const s = document.getElementById("sensitivity"); s.value = 1; s.dispatchEvent(new Event("input")); });
+    claim(await page.$eval("#minds", (e) => e.textContent) === "sensitive", "the slider does not tell its value");
+    const { sounds } = await page.evaluate(() => window.visavisLive.agent.session.stats());
+    claim(sounds.started === 3 && sounds.refused === 0 && sounds.overflowSamples === 0, JSON.stringify(sounds));
+    await page.evaluate(() => { const list = document.getElementById("model"); list.selectedIndex = 1; list.dispatchEvent(new Event("change")); });
+    d = await until(page, "a model without hearing", (x) => x.model === "tiny" && x.hearing === "false" && x.sounding === "", 30);
+    claim(await page.$eval("#room", (e) => e.hidden) && /hearing/.test(await page.$eval("#deaf", (e) => e.textContent)), "it does not say that it hears no sounds");
+    claim(/hearing/.test((await answer({ visavis: "sound", name: "bark", at: [1, 0.4, 1] })).error) && (await data(page)).errors === "0", "a sound for it is not refused");
+  },
   async broken() { // A sentence, not a blank page.
     await open();
     const says = async (name, page, words) => {

@@ -1,7 +1,8 @@
 // Joins the parts: what a person does, the agent, the stage, and what the page says about itself.
-import { createFace, createPose, createShapes, createWebgl, css, gazeColour, add } from "./stage.js";
+import { createFace, createPose, createShapes, createWebgl, css, gazeColour, add, sourceLines } from "./stage.js";
 import { createAgent } from "./agent.js";
 import { createVoice, decoded } from "./voice.js";
+import { SOUNDS, createSounds, floorAt } from "./sounds.js";
 import { createMicrophone } from "./microphone.js";
 import { createUser } from "./user.js";
 import { createXr } from "./xr.js";
@@ -42,7 +43,7 @@ async function start() {
   if (typeof WebAssembly === "undefined") throw new Error("The agent cannot run: this browser has no WebAssembly, or it is switched off. A current Chrome, Edge, Firefox or Safari has it.");
   const progress = (share) => { $("done").style.width = `${Math.round(100 * share)}%`; };
   const assets = await readAssets((share, what) => { progress(0.8 * share); $("says").textContent = what; }, options.get("model"));
-  const settings = { gaze: options.has("gaze") ? Number(options.get("gaze")) : 0.8, sampler: options.get("sampler") ?? "midpoint4", seed: Number(options.get("seed") ?? 1) };
+  const settings = { gaze: options.has("gaze") ? Number(options.get("gaze")) : 0.8, sampler: options.get("sampler") ?? "midpoint4", seed: Number(options.get("seed") ?? 1), sensitivity: 0 };
   $("says").textContent = "Starting the agent.";
   const agent = await createAgent({
     bundle: assets.bundle, wasm: assets.wasm, worker: assets.worker, ...settings,
@@ -64,6 +65,7 @@ async function start() {
   const openContext = () => (context ??= window.AudioContext ? new AudioContext({ latencyHint: "interactive" }) : null);
   const voice = createVoice(agent, openContext);
   const user = createUser(canvas);
+  const sounds = createSounds(agent, user, openContext);
   const figures = createFigures({ agent, renderer, settings, state: () => page.dataset });
   let over = 0, avatar = null;
   const microphone = createMicrophone(openContext, (samples, rate, level) => hear(samples, rate, level));
@@ -88,9 +90,32 @@ async function start() {
     $("target").textContent = settings.gaze === null ? "free" : settings.gaze.toFixed(2);
   }
 
+  function setSensitivity(value) {
+    settings.sensitivity = Math.min(1, Math.max(-1, value));
+    agent.session.setSensitivity(settings.sensitivity);
+    $("sensitivity").value = settings.sensitivity;
+    $("minds").textContent = ["dull", "neutral", "sensitive"].find((_, i) => Math.abs(settings.sensitivity - (i - 1)) < 0.05) ?? settings.sensitivity.toFixed(1);
+  }
+  // The sound that a click on the floor puts there, or null.
+  let armed = null, seen = null;
+  function arm(name) {
+    armed = name;
+    for (const button of $("sounds").children) button.setAttribute("aria-pressed", button.dataset.name === name);
+    page.toggleAttribute("data-armed", name !== null);
+  }
+  async function drop(what, at, rate) {
+    if (!agent.facts.hasHearing) throw new Error(deaf());
+    await sounds.drop(what, at, rate);
+    page.dataset.dropped = Number(page.dataset.dropped ?? 0) + 1;
+  }
+  const deaf = () => `${agent.facts.name} hears both voices, not the room: sounds need a model with hearing (visavis-room)`;
+  // Two metres behind it, a little to the side.
+  const behind = () => [root.x - 2 * Math.sin(root.yaw + 0.3), undefined, root.z - 2 * Math.cos(root.yaw + 0.3)];
+
   // Another model makes the motion from here on, where the agent stands.
   async function become(bundle) {
     interrupt();
+    sounds.clear();
     const options = () => ({ ...settings, start: [root.x, root.z, root.yaw] });
     await agent.become(bundle, options).catch((error) => {
       // Without a student network there is no single step.
@@ -103,8 +128,12 @@ async function start() {
   }
   // Who it is, for people and scripts.
   function introduce() {
-    const { kind, name, module } = agent.facts;
-    Object.assign(page.dataset, { module, model: name, kind });
+    const { kind, name, module, hasHearing } = agent.facts;
+    Object.assign(page.dataset, { module, model: name, kind, hearing: hasHearing });
+    $("room").hidden = !hasHearing;
+    $("deaf").hidden = hasHearing;
+    $("deaf").textContent = `${deaf()}.`;
+    if (!hasHearing) arm(null);
     $("whom").hidden = kind !== "dram";
     $("sampling").hidden = kind === "dram";
   }
@@ -129,6 +158,7 @@ async function start() {
       user.orbit.yaw = Math.atan2(user.position[0] - root.x, user.position[2] - root.z) + 1.2;
       press("outside", user.outside);
     },
+    sound() { if (agent.facts.hasHearing) drop(armed ?? SOUNDS[0], behind()); else notice(`No sound: ${deaf()}.`); },
     theme() { page.dataset.theme = page.dataset.theme === "dark" ? "light" : "dark"; },
     more() { if ($("more").open) $("more").close(); else { figures.show(); $("more").showModal(); } },
     async report() {
@@ -142,9 +172,27 @@ async function start() {
   for (const id of ["open-more", "close-more"]) $(id).addEventListener("click", acts.more);
   $("gaze").addEventListener("input", () => setGaze(Number($("gaze").value)));
   $("free").addEventListener("change", () => setGaze($("free").checked ? null : Number($("gaze").value)));
+  $("sensitivity").addEventListener("input", () => setSensitivity(Number($("sensitivity").value)));
+  for (const name of SOUNDS) {
+    const button = Object.assign(document.createElement("button"), { textContent: name, title: `Then click on the floor: ${name}` });
+    button.dataset.name = name;
+    button.addEventListener("click", () => arm(armed === name ? null : name));
+    $("sounds").append(button);
+  }
+  arm(null);
+  // A press that does not move puts the chosen sound there; what moves walks around.
+  let pressed = null;
+  canvas.addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
+  canvas.addEventListener("pointerup", (event) => {
+    if (!armed || !pressed || !seen || xr.mode || Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) > 6) return;
+    const box = canvas.getBoundingClientRect();
+    const at = floorAt(seen, (2 * (event.clientX - box.left)) / box.width - 1, 1 - (2 * (event.clientY - box.top)) / box.height, [root.x, root.z]);
+    if (at) drop(armed, at).catch((error) => notice(`No sound: ${explained(error)}.`));
+    else notice("That is above the floor: click on the floor.");
+  });
   $("sampler").value = settings.sampler;
   $("sampler").addEventListener("change", () => { settings.sampler = $("sampler").value; agent.session.setSampler(settings.sampler).catch((error) => notice(`No other sampler: ${explained(error)}`)); figures.restart(); });
-  for (const { name, kind } of assets.models) $("model").append(new Option(kind === "dram" ? `${name} (featherweight)` : name));
+  for (const { name, kind, hears } of assets.models) $("model").append(new Option(kind === "dram" ? `${name} (featherweight)` : hears ? `${name} (hears the room)` : name));
   $("choose").hidden = assets.models.length < 2;
   let chosen = $("model").selectedIndex = assets.first;
   $("model").addEventListener("change", async () => {
@@ -166,7 +214,7 @@ async function start() {
     button.addEventListener("click", () => say(samples, rate, name));
     $("lines").append(button);
   });
-  const keys = { m: acts.microphone, x: interrupt, v: acts.outside, t: acts.theme, "?": acts.more };
+  const keys = { m: acts.microphone, x: interrupt, b: acts.sound, v: acts.outside, t: acts.theme, "?": acts.more };
   window.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || event.repeat || event.target.closest?.("input, select, dialog")) return;
     if (/^[1-9]$/.test(event.key)) $("lines").children[Number(event.key) - 1]?.click();
@@ -210,6 +258,15 @@ async function start() {
     hear: (m) => hear(...samplesOf(m), 0),
     interrupt,
     gaze: ({ value }) => { if (value !== null && !(value >= 0 && value <= 1)) throw new Error("gaze is 0 to 1, or null"); setGaze(value); },
+    async sound({ name, samples, rate, at }) {
+      if (!Array.isArray(at) || at.length !== 3 || !at.every(Number.isFinite)) throw new Error("at is where the sound is: x, y, z in metres");
+      if (samples === undefined && !SOUNDS.includes(name)) throw new Error(`there is no sound "${name}"; there are ${SOUNDS.join(", ")}`);
+      await drop(...(samples === undefined ? [name, at] : [samplesOf({ samples, rate })[0], at, rate]));
+    },
+    sensitivity({ value }) {
+      if (!(value >= -1 && value <= 1)) throw new Error("sensitivity is -1 (dull) to 1 (sensitive)");
+      setSensitivity(value);
+    },
     state: () => ({ ...page.dataset }),
   });
 
@@ -252,7 +309,8 @@ async function start() {
     if (canvas.height !== Math.round(h * ratio)) canvas.height = Math.round(h * ratio);
     user.update([root.x, 0, root.z], seconds);
     const covered = page.hasAttribute("data-clean") ? 0 : $("desk").offsetHeight / Math.max(1, h);
-    draw(now, [user.view(pose, canvas.width, canvas.height, covered * 0.9, seconds)], null, false);
+    seen = user.view(pose, canvas.width, canvas.height, covered * 0.9, seconds);
+    draw(now, [seen], null, false);
   }
 
   function draw(now, views, framebuffer, seeThrough) {
@@ -267,7 +325,8 @@ async function start() {
     face.update(pose, agent.now(), level, seconds);
     for (const view of views) view.target ??= pose.root;
     const outside = user.outside && !xr.mode;
-    const lines = outside ? window_lines() : [];
+    sounds.listen();
+    const lines = [...(outside ? window_lines() : []), ...sourceLines(sounds.shown())];
     renderer.draw({ pose, views, lines, theme: page.dataset.theme, fromUser: !outside, backdrop: true, place: [0, 0, 0], seeThrough, bodiless: avatar !== null, framebuffer });
     if (avatar) {
       avatar.pose(pose, moment.from.local, face, seconds);
@@ -285,7 +344,7 @@ async function start() {
     const moment = agent.at(), gaze = moment.from.gaze, saying = voice.saying(), speaking = voice.speaking(), data = page.dataset, p = user.position;
     const { calls, triangles } = renderer.counts();
     Object.assign(data, {
-      frames: Math.round(agent.computed() * 30), drawn, speaking, mouth: face.open.toFixed(2), gaze: Number.isNaN(gaze) ? "" : gaze.toFixed(3), dyadic: mean(moment.from.dyadic), calls, triangles,
+      frames: Math.round(agent.computed() * 30), drawn, speaking, mouth: face.open.toFixed(2), gaze: Number.isNaN(gaze) ? "" : gaze.toFixed(3), dyadic: mean(moment.from.dyadic), calls, triangles, sounding: sounds.sounding().join(" "),
       root: `${root.x.toFixed(3)},${root.z.toFixed(3)}`, yaw: root.yaw.toFixed(4), user: p.map((x) => x.toFixed(3)).join(","), bearing: Math.atan2(p[0] - root.x, p[2] - root.z).toFixed(4),
     });
     $("interrupt").disabled = !speaking;
@@ -293,7 +352,7 @@ async function start() {
     $("scored").textContent = Number.isNaN(gaze) ? "–" : gaze.toFixed(2);
     $("score").style.background = Number.isNaN(gaze) ? "" : css(gazeColour(gaze));
     for (const button of $("lines").children) button.dataset.on = saying === button.textContent;
-    const says = !moment.from.index && !agent.computed() ? "Starting." : speaking ? "It is speaking." : microphone.on ? (microphone.level > 0.02 ? "It hears you." : "It listens.") : "Walk around it, let it speak, or talk to it.";
+    const says = !moment.from.index && !agent.computed() ? "Starting." : armed ? `Click on the floor: there is the ${armed}.` : speaking ? "It is speaking." : microphone.on ? (microphone.level > 0.02 ? "It hears you." : "It listens.") : "Walk around it, let it speak, or talk to it.";
     if ($("says").textContent !== says) $("says").textContent = says;
   }
 
@@ -306,9 +365,10 @@ async function start() {
   $("welcome").hidden = true;
   $("desk").hidden = false;
   introduce();
+  setSensitivity(0);
   page.dataset.mode = "screen";
   requestAnimationFrame(loop);
   // For scripts in this window; other windows send messages (channel.js).
-  window.visavisLive = { agent, voice, user, xr, take, say, interrupt, setGaze, pose, face, behind: () => context && voice.behind(context) };
+  window.visavisLive = { agent, voice, user, sounds, drop, xr, take, say, interrupt, setGaze, pose, face, behind: () => context && voice.behind(context) };
   if (!errors) page.dataset.state = "ready";
 }

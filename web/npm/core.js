@@ -132,6 +132,18 @@ class SessionCore {
     this.core.do("visavis_push_pose", this.pointer, x, y, z, qx, qy, qz, qw, time);
   }
 
+  pushSound(id, samples, rate, [x, y, z]) {
+    this.core.withBytes(samples, (at) => this.core.do("visavis_push_sound", this.pointer, id, at, samples.length, rate, x, y, z));
+  }
+
+  endSound(id) {
+    this.core.do("visavis_end_sound", this.pointer, id);
+  }
+
+  setSensitivity(sensitivity) {
+    this.core.do("visavis_set_sensitivity", this.pointer, sensitivity);
+  }
+
   setGaze(target) {
     this.core.do("visavis_set_gaze", this.pointer, target ?? NaN);
   }

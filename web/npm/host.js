@@ -136,6 +136,18 @@ export function serve(port) {
       this.#session.pushPose(x, y, z, rotation, time);
     }
 
+    pushSound(id, samples, rate, position) {
+      this.#session.pushSound(id, samples, rate, position);
+    }
+
+    endSound(id) {
+      this.#session.endSound(id);
+    }
+
+    setSensitivity(sensitivity) {
+      this.#session.setSensitivity(sensitivity);
+    }
+
     setGaze(target) {
       this.#session.setGaze(target);
     }

@@ -80,6 +80,8 @@ export interface EngineFacts {
   blockFrames: 4;
   /** Whether the sampler `single` can be used. */
   hasStudent: boolean;
+  /** Whether sounds in the room are heard: {@link Session.pushSound}. */
+  hasHearing: boolean;
   /** VRM humanoid names; the parent's index (null: none); offset from the parent in the T-pose that faces +Z, metres. */
   joints: { name: string; parent: number | null; offset: [number, number, number] }[];
   /** Midpoint of the eyes, and a point behind it, in the head's frame, metres. */
@@ -112,6 +114,8 @@ export interface SessionOptions {
    * counted. A second takes 192 KB: a crowd that hears sound as it comes does with the least.
    */
   voiceAhead?: number;
+  /** How much the agent minds sounds in the room: -1 dull, 0 (default) neutral, 1 sensitive, up to 1.5 either way. */
+  sensitivity?: number;
   /** `real` (default): blocks are computed as time goes by. `manual`: by {@link Session.advance}. */
   clock?: "real" | "manual";
 }
@@ -152,6 +156,17 @@ export interface Session {
   interrupt(): void;
   /** Makes a voice present (silent until something is pushed) or absent. */
   setVoicePresent(who: "agent" | "user", present: boolean): void;
+  /**
+   * A piece of what sound source `id` in the room gives off: mono, pascals as they are 1 m from it (RMS 1 is 94 dB SPL), `rate` 8000 to
+   * 192000 Hz; `position` is where it is from now on, world metres. The first piece of a source sounds from the next block on, further ones
+   * follow it, up to ten seconds ahead; none at all moves a source that sounds. Sixteen sound at once, the loudest ones. Throws where the
+   * bundle has no hearing; a place or samples that are not finite are told by {@link Session.onError} and counted.
+   */
+  pushSound(id: number, samples: Float32Array, rate: number, position: ArrayLike<number>): void;
+  /** Ends a source at once. */
+  endSound(id: number): void;
+  /** How much the agent minds sounds in the room: -1 dull, 0 neutral, 1 sensitive, up to 1.5 either way. */
+  setSensitivity(sensitivity: number): void;
   setGaze(target: number | null): void;
   setSampler(sampler: Sampler): Promise<void>;
   setBudget(milliseconds: number): Promise<void>;
@@ -216,6 +231,11 @@ export interface SessionStats {
   agentVoice: VoiceStats;
   userVoice: VoiceStats;
   head: { accepted: number; nonFinite: number; outOfOrder: number; absurd: number; teleports: number; overwritten: number };
+  /** Of all sources in the room together; zeros where the bundle has no hearing. `refused`: too many sounded, `replaced`: by louder ones. */
+  sounds: {
+    pieces: number; started: number; overflowSamples: number; clippedSamples: number; nonFiniteSamples: number; badRateSamples: number;
+    badPlaces: number; refused: number; replaced: number;
+  };
   governor: { missed: number; down: number; up: number; heldBlocks: number; fallbackBlocks: number; catchUpPasses: number };
   guardTrips: number;
   guardHeldFrames: number;

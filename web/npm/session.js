@@ -15,6 +15,7 @@ export class Session {
   delay = 4 / 30;
   #link;
   #joints;
+  #hears;
   #id;
   #recent = new Recent();
   #origin;
@@ -28,6 +29,7 @@ export class Session {
     checked(options);
     this.#link = link;
     this.#joints = facts.joints.length;
+    this.#hears = facts.hasHearing;
     this.#id = id;
     this.#clock = clock;
     this.#origin = wall();
@@ -76,6 +78,29 @@ export class Session {
 
   setVoicePresent(who, present) {
     this.#tell("setVoicePresent", [which(who), Boolean(present)]);
+  }
+
+  pushSound(id, samples, rate, position) {
+    const piece = voice(samples, rate);
+    const place = Array.from(position !== null && typeof position === "object" ? position : []);
+    typed("the place of a sound", "three numbers x, y, z", place.length === 3 && place.every((v) => typeof v === "number"));
+    this.#tell("pushSound", [this.#source(id), ...piece, place]);
+  }
+
+  endSound(id) {
+    this.#tell("endSound", [this.#source(id)]);
+  }
+
+  setSensitivity(sensitivity) {
+    if (!(Math.abs(number("sensitivity", sensitivity)) <= 1.5)) throw argument(`sensitivity ${sensitivity}: -1.5 to 1.5`);
+    this.#tell("setSensitivity", [sensitivity]);
+  }
+
+  /** A source's number, where the bundle hears it. */
+  #source(id) {
+    typed("the number of a sound", "a whole number, 0 to 4294967295", Number.isInteger(id) && id >= 0 && id <= 0xffffffff);
+    if (!this.#hears) throw argument("this bundle has no hearing, so no sound is heard: load one whose facts.hasHearing is true");
+    return id;
   }
 
   setGaze(target) {

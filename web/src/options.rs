@@ -18,6 +18,7 @@ struct Wishes {
     stance: bool,
     guard: bool,
     voice_ahead: f64,
+    sensitivity: f32,
 }
 
 impl Default for Wishes {
@@ -34,6 +35,7 @@ impl Default for Wishes {
             stance: true,
             guard: true,
             voice_ahead: SessionOptions::default().voice_ahead,
+            sensitivity: 0.0,
         }
     }
 }
@@ -54,6 +56,7 @@ pub(crate) fn parse(json: &[u8]) -> Result<SessionOptions> {
         stance: wishes.stance,
         guard: wishes.guard,
         voice_ahead: wishes.voice_ahead,
+        sensitivity: wishes.sensitivity,
         ..SessionOptions::default()
     })
 }

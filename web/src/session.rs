@@ -131,6 +131,39 @@ pub unsafe extern "C" fn visavis_push_pose(
     unsafe { with(session, |s| s.push_user_pose(Vec3::new(x, y, z), Some(rotation), time)) }
 }
 
+/// Pushes a piece of what sound source `id` gives off: mono samples, pascals as they are 1 m from it,
+/// 8000 to 192000 Hz; it is at (x, y, z) from now on, world metres.
+#[allow(clippy::too_many_arguments, reason = "a module takes numbers alone")]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_push_sound(
+    session: *mut Conversation,
+    id: u32,
+    samples: *const f32,
+    count: usize,
+    rate: u32,
+    x: f32,
+    y: f32,
+    z: f32,
+) -> i32 {
+    // SAFETY: the chapter on ownership, twice.
+    unsafe { with(session, |s| s.push_sound(id, slice(samples, count), rate, Vec3::new(x, y, z))) }
+}
+
+/// Ends a sound source at once.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_end_sound(session: *mut Conversation, id: u32) -> i32 {
+    // SAFETY: the chapter on ownership.
+    unsafe { with(session, |s| s.end_sound(id)) }
+}
+
+/// Sets how much the agent minds sounds in the room: -1 dull, 0 neutral, 1 sensitive, up to 1.5
+/// either way.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_set_sensitivity(session: *mut Conversation, sensitivity: f32) -> i32 {
+    // SAFETY: the chapter on ownership.
+    unsafe { with(session, |s| s.set_sensitivity(sensitivity)) }
+}
+
 /// Sets the gaze target, -1 to 1; NaN leaves the gaze free.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_set_gaze(session: *mut Conversation, target: f32) -> i32 {

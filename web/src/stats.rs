@@ -15,6 +15,7 @@ struct Stats {
     agent_voice: Voice,
     user_voice: Voice,
     head: Head,
+    sounds: Sounds,
     governor: Governor,
     guard_trips: u64,
     guard_held_frames: u64,
@@ -51,6 +52,20 @@ struct Head {
 
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
+struct Sounds {
+    pieces: u64,
+    started: u64,
+    overflow_samples: u64,
+    clipped_samples: u64,
+    non_finite_samples: u64,
+    bad_rate_samples: u64,
+    bad_places: u64,
+    refused: u64,
+    replaced: u64,
+}
+
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
 struct Governor {
     missed: u64,
     down: u64,
@@ -74,7 +89,7 @@ impl From<VoiceStats> for Voice {
 
 pub(crate) fn json(s: &SessionStats) -> String {
     let [p50, p95, p99, max] = s.block_ms;
-    let (h, g) = (s.inputs.head, s.governor);
+    let (h, g, v) = (s.inputs.head, s.governor, s.inputs.sounds);
     let stats = Stats {
         blocks: s.blocks,
         block_ms: Percentiles { p50, p95, p99, max },
@@ -91,6 +106,17 @@ pub(crate) fn json(s: &SessionStats) -> String {
             absurd: h.absurd,
             teleports: h.teleports,
             overwritten: h.overwritten,
+        },
+        sounds: Sounds {
+            pieces: v.pieces,
+            started: v.started,
+            overflow_samples: v.overflow_samples,
+            clipped_samples: v.clipped_samples,
+            non_finite_samples: v.non_finite_samples,
+            bad_rate_samples: v.bad_rate_samples,
+            bad_places: v.bad_places,
+            refused: v.refused,
+            replaced: v.replaced,
         },
         governor: Governor {
             missed: g.missed,

@@ -66,8 +66,8 @@ impl Digest {
     }
 }
 
-/// With `rotations` the head is pushed with its own.
-fn motion(engine: *const Engine, options: &str, blocks: usize, rotations: bool) -> String {
+/// With `rotations` the head is pushed with its own, with `sounds` there is one in the room that moves.
+fn motion(engine: *const Engine, options: &str, blocks: usize, rotations: bool, sounds: bool) -> String {
     let conversation = session(engine, options).unwrap();
     // SAFETY: alive.
     let (joints, kind) = unsafe { ((*engine).rig().len(), (*engine).kind()) };
@@ -78,6 +78,12 @@ fn motion(engine: *const Engine, options: &str, blocks: usize, rotations: bool) 
     unsafe {
         for (number, voice, rate) in [(0, &agent, AGENT_RATE), (1, &user, USER_RATE)] {
             assert_eq!(visavis_push_voice(conversation, number, voice.as_ptr(), voice.len(), rate as u32), 0);
+        }
+        for x in [-2.0, 1.0].into_iter().filter(|_| sounds) {
+            let sound = voice(3, USER_RATE, USER_RATE);
+            let status =
+                visavis_push_sound(conversation, 7, sound.as_ptr(), sound.len(), USER_RATE as u32, x, 1.0, -1.5);
+            assert_eq!(status, 0, "{}", text());
         }
         for n in 0..seconds * 72 {
             let [x, y, z] = head(n).map(|v| v as f32);
@@ -120,6 +126,8 @@ fn motion_is_that_of_the_file_that_webassembly_is_compared_with() {
         (tiny, 24, r#"{"sampler":"midpoint1","gaze":0.8}"#),
         (tiny, 24, r#"{"sampler":"euler:5","gaze":0.25,"guidance":3}"#),
         (tiny, 24, r#"{"sampler":"single","start":[1,2,0.5]}"#),
+        ("tests/goldens/hearing.safetensors", 24, r#"{"gaze":0.8}"#),
+        ("tests/goldens/hearing.safetensors", 24, r#"{"sampler":"single","sensitivity":-1.5}"#),
         ("tests/goldens/dram-tcn.safetensors", 40, r#"{"gaze":0.8}"#),
         ("tests/goldens/dram-lstm.safetensors", 40, "{}"),
         (shipped, 100, r#"{"sampler":"single"}"#),
@@ -130,8 +138,8 @@ fn motion_is_that_of_the_file_that_webassembly_is_compared_with() {
         if bundle != engine_of {
             (engine_of, loaded) = (bundle, engine(bundle));
         }
-        writeln!(lines, "{bundle} {blocks} {options} {}", motion(loaded, options, blocks, bundle.contains("dram")))
-            .unwrap();
+        let digest = motion(loaded, options, blocks, bundle.contains("dram"), bundle.contains("hearing"));
+        writeln!(lines, "{bundle} {blocks} {options} {digest}").unwrap();
     }
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/digests.txt");
     if std::env::var("VISAVIS_DIGESTS").is_ok_and(|v| v == "write") {
@@ -170,6 +178,29 @@ fn late_blocks_are_left_to_the_fallback() {
 }
 
 #[test]
+fn sounds_that_are_wrong_have_a_status_and_are_counted() {
+    let hearing = engine("tests/goldens/hearing.safetensors");
+    let conversation = session(hearing, r#"{"sampler":"single"}"#).unwrap();
+    let sound = [0.0, f32::NAN, 65.0];
+    // SAFETY: what is not freed is alive; the sound outlives the pushes.
+    unsafe {
+        visavis_engine_facts(hearing);
+        assert!(text().contains(r#""hasHearing":true"#), "{}", text());
+        let push = |count, rate, x| visavis_push_sound(conversation, 1, sound.as_ptr(), count, rate, x, 1.0, 2.0);
+        assert_eq!(push(1, 24_000, f32::INFINITY), 1, "{}", text());
+        assert_eq!(push(1, 0, 0.0), 6, "{}", text());
+        assert_eq!(push(3, 24_000, 0.0), 6, "{}", text());
+        assert_eq!(visavis_poll(conversation, 0.0), 1);
+        assert_eq!(visavis_end_sound(conversation, 1), 0);
+        visavis_stats(conversation);
+        let counted = r#""sounds":{"pieces":1,"started":1,"overflowSamples":0,"clippedSamples":1,"nonFiniteSamples":1,"badRateSamples":1,"badPlaces":1,"#;
+        assert!(text().contains(counted), "{}", text());
+        visavis_session_free(conversation);
+        visavis_engine_free(hearing);
+    }
+}
+
+#[test]
 fn what_is_wrong_has_a_status_and_a_text() {
     let mut status = 0;
     // SAFETY: all outlives the calls; what is not null is alive.
@@ -186,6 +217,7 @@ fn what_is_wrong_has_a_status_and_a_text() {
             (r#"{"sampler":"best"}"#, "unknown sampler"),
             (r#"{"gaze":2}"#, "gaze target 2"),
             (r#"{"voiceAhead":0.4}"#, "voice_ahead is 0.4"),
+            (r#"{"sensitivity":2}"#, "sensitivity"),
         ] {
             let (status, text) = session(engine, options).unwrap_err();
             assert_eq!(status, 1);
@@ -195,6 +227,11 @@ fn what_is_wrong_has_a_status_and_a_text() {
         visavis_engine_free(engine);
         assert_eq!(visavis_push_voice(conversation, 0, [0.0_f32; 4].as_ptr(), 4, 1), 6, "{}", text());
         assert_eq!(visavis_push_voice(conversation, 2, std::ptr::null(), 0, 48_000), 1, "{}", text());
+        assert_eq!(visavis_push_sound(conversation, 1, [0.0_f32; 4].as_ptr(), 4, 24_000, 0.0, 1.0, 2.0), 1);
+        assert!(text().contains("hearing"), "{}", text());
+        assert_eq!(visavis_end_sound(conversation, 1), 1, "{}", text());
+        assert_eq!(visavis_set_sensitivity(conversation, f32::NAN), 1, "{}", text());
+        assert_eq!(visavis_set_sensitivity(conversation, -1.0), 0);
         assert_eq!(visavis_poll(conversation, f64::NAN), -1, "{}", text());
         assert_eq!(visavis_poll(conversation, 0.0), 1);
         assert_eq!(visavis_poll(conversation, 0.0), 0);

@@ -141,6 +141,61 @@ test("late blocks are left to the fallback, whose frames tell whom the joints fo
   await assert.rejects(engine.loadFallback(light), kind("closed"));
 });
 
+test("sounds in the room are heard where the bundle has hearing, at their place", async () => {
+  const engine = await load({ bundle: "tests/goldens/hearing.safetensors" });
+  assert.equal(engine.facts.hasHearing, true);
+  const bang = Float32Array.from({ length: 9600 }, (_, i) => ((i * 7919) % 2000 - 1000) / 125);
+  const motion = async (push, options = {}) => {
+    const session = engine.session({ clock: "manual", ...options });
+    const frames = [];
+    session.onFrames = (four) => frames.push(...four);
+    push(session);
+    await session.advance(0.5);
+    const { sounds } = await session.stats();
+    session.close();
+    return { bits: Buffer.concat(frames.map((f) => Buffer.from(f.joints.slice().buffer))), sounds };
+  };
+  const beside = (x) => (session) => session.pushSound(7, bang, 24000, [x, 1, -2]);
+  const heard = await motion(beside(1));
+  assert.deepEqual([heard.sounds.pieces, heard.sounds.started, heard.sounds.refused], [1, 1, 0]);
+  const pieces = await motion((session) => [0, 1, 2].forEach((i) => session.pushSound(7, bang.subarray(3200 * i, 3200 * (i + 1)), 24000, Float32Array.of(1, 1, -2))));
+  assert.ok(heard.bits.equals(pieces.bits));
+  const others = [
+    await motion(() => {}), await motion(beside(-1)), await motion(beside(1), { sensitivity: 1 }), await motion((session) => { beside(1)(session); session.endSound(7); }),
+    await motion((session) => { session.setSensitivity(-1); beside(1)(session); }),
+  ];
+  for (const other of others) assert.ok(!heard.bits.equals(other.bits));
+
+  const session = engine.session({ clock: "manual" });
+  for (const id of [-1, 1.5, 2 ** 32, "1", null]) assert.throws(() => session.pushSound(id, bang, 24000, [0, 1, 2]), kind("argument", /number of a sound/));
+  for (const place of [null, [0, 1], "here", [0, 1, "2"]]) assert.throws(() => session.pushSound(1, bang, 24000, place), kind("argument", /three numbers/));
+  assert.throws(() => session.pushSound(1, [0, 1], 24000, [0, 1, 2]), kind("argument", /Float32Array/));
+  assert.throws(() => session.pushSound(1, bang, 0, [0, 1, 2]), kind("audio", /8000/));
+  for (const value of [1.6, NaN, "1"]) assert.throws(() => session.setSensitivity(value), kind("argument", /sensitivity/));
+  await assert.rejects(engine.session({ sensitivity: -2 }).ready, kind("argument", /sensitivity/));
+  const told = [];
+  session.onError = (error) => told.push(error.kind);
+  session.pushSound(1, bang, 24000, [NaN, 1, 2]);
+  session.pushSound(1, Float32Array.of(0, NaN, 99), 24000, [0, 1, 2]);
+  for (let id = 2; id < 102; id++) session.pushSound(id, bang, 24000, [0, 1.6, 0]);
+  await session.advance(0.5);
+  const { sounds, blocks } = await session.stats();
+  assert.deepEqual(told, ["argument", "audio"]);
+  assert.equal(blocks, 4);
+  assert.deepEqual([sounds.badPlaces, sounds.nonFiniteSamples, sounds.clippedSamples], [1, 1, 1]);
+  assert.ok(sounds.refused >= 84, `${sounds.refused}`);
+  engine.close();
+
+  const deaf = await load();
+  assert.equal(deaf.facts.hasHearing, false);
+  const without = deaf.session({ clock: "manual" });
+  assert.throws(() => without.pushSound(1, bang, 24000, [0, 1, 2]), kind("argument", /hearing/));
+  assert.throws(() => without.endSound(1), kind("argument", /hearing/));
+  without.setSensitivity(1);
+  await without.advance(0.2);
+  deaf.close();
+});
+
 test("in real time a block comes every 133 ms, pauses stop it", async () => {
   const engine = await load();
   const session = engine.session({ sampler: "single" });
@@ -223,7 +278,7 @@ test("any values at all: an error of ours or none, and the session goes on", asy
   const odd = [NaN, Infinity, -Infinity, 0, -0, 1e308, -1e308, 5e-324, 1.5, 2 ** 53, -1, null, undefined, "", "agent", {}, [], true, 10n, new Float32Array(3), () => 0];
   let state = 7;
   const pick = () => odd[(state = (Math.imul(state, 1664525) + 1013904223) >>> 0) % odd.length];
-  const calls = ["pushUserHead", "pushUserVoice", "pushAgentVoice", "finishVoice", "clearVoice", "setVoicePresent", "setGaze", "setSampler", "setBudget", "setFallback", "reportBlockTime"];
+  const calls = ["pushUserHead", "pushUserVoice", "pushAgentVoice", "finishVoice", "clearVoice", "setVoicePresent", "setGaze", "setSampler", "setBudget", "setFallback", "reportBlockTime", "pushSound", "endSound", "setSensitivity"];
   for (let i = 0; i < 3000; i++) {
     try {
       await session[calls[i % calls.length]](pick(), pick(), pick(), pick());

@@ -10,7 +10,7 @@ const modules = [{ module: "simd128" }, { module: "relaxed" }];
 if (process.env.VISAVIS_SCALAR) modules.push({ module: "simd128", wasm: { simd128: readFileSync(process.env.VISAVIS_SCALAR) }, name: "scalar" });
 
 for (const { name, ...chosen } of modules) {
-  for (const bundle of ["tests/goldens/tiny.safetensors", "models/visavis-base-i8.safetensors"]) {
+  for (const bundle of ["tests/goldens/tiny.safetensors", "tests/goldens/hearing.safetensors", "models/visavis-base-i8.safetensors"]) {
     test(`${name ?? chosen.module}, ${bundle}`, async () => {
       const engine = await load({ bundle, ...chosen });
       const wanted = cases(readFileSync(new URL("digests.txt", import.meta.url), "utf8")).filter((c) => c.bundle === bundle);

@@ -22,11 +22,12 @@ export function head(n) {
 /** Its rotation there. */
 const turned = (n) => (n % 576 < 288 ? [0, 0.8, 0, 0.6] : [0.28, 0, 0, 0.96]);
 
-/** Pushes all that a session of `blocks` blocks hears and sees; with `rotations` the head's own. */
-export function fill(session, blocks, rotations = false) {
+/** Pushes all that a session of `blocks` blocks hears and sees; with `rotations` the head's own, with `sounds` one in the room that moves. */
+export function fill(session, blocks, { rotations = false, sounds = false } = {}) {
   const seconds = Math.floor((blocks * 4) / 30) + 1;
   session.pushAgentVoice(voice(1, seconds * AGENT_RATE, AGENT_RATE), AGENT_RATE);
   session.pushUserVoice(voice(2, seconds * USER_RATE, USER_RATE), USER_RATE);
+  if (sounds) [-2, 1].forEach((x) => session.pushSound(7, voice(3, USER_RATE, USER_RATE), USER_RATE, [x, 1, -1.5]));
   for (let n = 0; n < seconds * 72; n++) session.pushUserHead(...head(n), n / 72, rotations ? turned(n) : null);
 }
 
@@ -72,7 +73,7 @@ export async function motion(engine, { bundle, blocks, options }) {
   const session = engine.session({ ...options, clock: "manual" });
   const digest = new Digest();
   session.onFrames = (frames) => digest.frames(frames);
-  fill(session, blocks, bundle.includes("dram"));
+  fill(session, blocks, { rotations: bundle.includes("dram"), sounds: bundle.includes("hearing") });
   await session.advance((blocks * 4) / 30 - 0.01);
   session.close();
   return digest.toString();

@@ -20,6 +20,7 @@ native!("Java_org_visavis_Native_engineFromBytes": engine_from_bytes(bytes: jbyt
 native!("Java_org_visavis_Native_engineClose": engine_close(engine: jlong) -> jboolean);
 native!("Java_org_visavis_Native_engineName": engine_name(engine: jlong) -> JString);
 native!("Java_org_visavis_Native_engineHasStudent": engine_has_student(engine: jlong) -> jboolean);
+native!("Java_org_visavis_Native_engineHasHearing": engine_has_hearing(engine: jlong) -> jboolean);
 native!("Java_org_visavis_Native_engineJointNames": engine_joint_names(engine: jlong) -> JString[]);
 native!("Java_org_visavis_Native_engineJointParents": engine_joint_parents(engine: jlong) -> jint[]);
 native!("Java_org_visavis_Native_engineRestOffsets": engine_rest_offsets(engine: jlong) -> jfloat[]);
@@ -76,6 +77,10 @@ fn engine_name<'l>(env: &mut Env<'l>, _: JClass<'l>, engine: jlong) -> Outcome<J
 
 fn engine_has_student<'l>(_: &mut Env<'l>, _: JClass<'l>, engine: jlong) -> Outcome<jboolean> {
     Ok(ENGINES.get(engine)?.has_student())
+}
+
+fn engine_has_hearing<'l>(_: &mut Env<'l>, _: JClass<'l>, engine: jlong) -> Outcome<jboolean> {
+    Ok(ENGINES.get(engine)?.has_hearing())
 }
 
 fn engine_joint_names<'l>(env: &mut Env<'l>, _: JClass<'l>, engine: jlong) -> Outcome<JObjectArray<'l, JString<'l>>> {

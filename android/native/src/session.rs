@@ -25,7 +25,7 @@ const JOINT: usize = 11;
 native!("Java_org_visavis_Native_sessionNew": session_new(
     engine: jlong, seed: jlong, threads: jint, core_mask: jlong, sampler: JString, gaze: jfloat, guidance: jfloat,
     gaze_guidance: jfloat, temperature: jfloat, x: jdouble, z: jdouble, yaw: jdouble, stance: jboolean, guard: jboolean, budget: jfloat,
-    voice_ahead: jdouble
+    voice_ahead: jdouble, sensitivity: jfloat
 ) -> jlong);
 native!("Java_org_visavis_Native_sessionClose": session_close(session: jlong) -> jboolean);
 native!("Java_org_visavis_Native_pushBuffer": push_buffer(session: jlong, voice: jint, buffer: java.nio.FloatBuffer, position: jint, count: jint, rate: jint));
@@ -33,6 +33,14 @@ native!("Java_org_visavis_Native_pushArray": push_array(session: jlong, voice: j
 native!("Java_org_visavis_Native_finishVoice": finish_voice(session: jlong, voice: jint));
 native!("Java_org_visavis_Native_clearVoice": clear_voice(session: jlong, voice: jint));
 native!("Java_org_visavis_Native_setVoicePresent": set_voice_present(session: jlong, voice: jint, present: jboolean));
+native!("Java_org_visavis_Native_pushSoundBuffer": push_sound_buffer(
+    session: jlong, id: jint, buffer: java.nio.FloatBuffer, position: jint, count: jint, rate: jint, x: jfloat, y: jfloat, z: jfloat
+));
+native!("Java_org_visavis_Native_pushSoundArray": push_sound_array(
+    session: jlong, id: jint, samples: jfloat[], offset: jint, count: jint, rate: jint, x: jfloat, y: jfloat, z: jfloat
+));
+native!("Java_org_visavis_Native_endSound": end_sound(session: jlong, id: jint));
+native!("Java_org_visavis_Native_setSensitivity": set_sensitivity(session: jlong, sensitivity: jfloat));
 native!("Java_org_visavis_Native_pushHead": push_head(session: jlong, x: jfloat, y: jfloat, z: jfloat, time: jdouble));
 native!("Java_org_visavis_Native_pushPose": push_pose(
     session: jlong, x: jfloat, y: jfloat, z: jfloat, qx: jfloat, qy: jfloat, qz: jfloat, qw: jfloat, time: jdouble
@@ -103,6 +111,7 @@ fn session_new<'l>(
     guard: jboolean,
     budget: jfloat,
     voice_ahead: jdouble,
+    sensitivity: jfloat,
 ) -> Outcome<jlong> {
     let engine = ENGINES.get(engine)?;
     // NaN is what Java's options hold for "the bundle's".
@@ -121,6 +130,7 @@ fn session_new<'l>(
         guard,
         governor: Governor::within(budget),
         voice_ahead,
+        sensitivity,
         ..Default::default()
     };
     Ok(SESSIONS.insert(Arc::new(SharedSession::new(engine.session(options)?))))
@@ -160,14 +170,72 @@ fn push_array<'l>(
     count: jint,
     rate_: jint,
 ) -> Outcome {
+    with_part(env, &samples, offset, count, |samples| {
+        around(session, |shared| Ok(shared.voice(Speaker::try_from(voice)?).push(samples, rate(rate_)?)?))
+    })
+}
+
+/// Runs `body` on a copy of a part of an array.
+fn with_part<'l>(
+    env: &mut Env<'l>,
+    samples: &JFloatArray<'l>,
+    offset: jint,
+    count: jint,
+    body: impl FnOnce(&[f32]) -> Outcome,
+) -> Outcome {
     if samples.is_null() {
         return Err(jni::errors::Error::NullPtr("samples are null").into());
     }
     let count = part(samples.len(env)?, offset, count)?;
     with_scratch(count, |scratch| {
         samples.get_region(env, offset, scratch)?;
-        around(session, |shared| Ok(shared.voice(Speaker::try_from(voice)?).push(scratch, rate(rate_)?)?))
+        body(scratch)
     })
+}
+
+#[expect(clippy::too_many_arguments, reason = "a buffer and a place are three each")]
+fn push_sound_buffer<'l>(
+    env: &mut Env<'l>,
+    _: JClass<'l>,
+    session: jlong,
+    id: jint,
+    buffer: JObject<'l>,
+    position: jint,
+    count: jint,
+    rate_: jint,
+    x: jfloat,
+    y: jfloat,
+    z: jfloat,
+) -> Outcome {
+    around(session, |shared| {
+        // SAFETY: a FloatBuffer; Java has checked the order of its bytes.
+        let samples = unsafe { elements(env, &buffer, position, count) }?;
+        let rate = rate(rate_)?;
+        Ok(with_floats(samples, |samples| shared.sounds().push(id as u32, samples, rate, Vec3::new(x, y, z)))?)
+    })
+}
+
+#[expect(clippy::too_many_arguments, reason = "a part of an array and a place are three each")]
+fn push_sound_array<'l>(
+    env: &mut Env<'l>,
+    _: JClass<'l>,
+    session: jlong,
+    id: jint,
+    samples: JFloatArray<'l>,
+    offset: jint,
+    count: jint,
+    rate_: jint,
+    x: jfloat,
+    y: jfloat,
+    z: jfloat,
+) -> Outcome {
+    with_part(env, &samples, offset, count, |samples| {
+        around(session, |shared| Ok(shared.sounds().push(id as u32, samples, rate(rate_)?, Vec3::new(x, y, z))?))
+    })
+}
+
+fn end_sound<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, id: jint) -> Outcome {
+    around(session, |shared| Ok(shared.sounds().end(id as u32)?))
 }
 
 fn finish_voice<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, voice: jint) -> Outcome {
@@ -245,6 +313,10 @@ fn set_guidance<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, weight: jflo
 fn set_sampler<'l>(env: &mut Env<'l>, _: JClass<'l>, session: jlong, sampler: JString<'l>) -> Outcome {
     let sampler = sampler.try_to_string(env)?.parse()?;
     around(session, |s| Ok(s.controls().set_sampler(sampler)?))
+}
+
+fn set_sensitivity<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, sensitivity: jfloat) -> Outcome {
+    around(session, |s| Ok(s.controls().set_sensitivity(sensitivity)?))
 }
 
 fn set_budget<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, milliseconds: jfloat) -> Outcome {

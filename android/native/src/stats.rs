@@ -34,6 +34,9 @@ fn row(s: &SessionStats) -> Vec<f64> {
         [head.accepted, head.non_finite, head.out_of_order, head.absurd, head.teleports, head.overwritten]
             .map(|n| n as f64),
     );
+    let v = s.inputs.sounds;
+    row.extend([v.pieces, v.started, v.overflow_samples, v.clipped_samples, v.non_finite_samples].map(|n| n as f64));
+    row.extend([v.bad_rate_samples, v.bad_places, v.contended_samples, v.refused, v.replaced].map(|n| n as f64));
     let g = s.governor;
     row.extend([g.missed, g.down, g.up, g.held_blocks, g.fallback_blocks, g.catch_up_passes].map(|n| n as f64));
     row.extend([s.guard.trips, s.guard.held_frames].map(|n| n as f64));

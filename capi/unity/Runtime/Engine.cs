@@ -51,6 +51,9 @@ namespace Visavis
         /// <summary>Name of the model.</summary>
         public string Name => Errors.Text(Native.visavis_engine_name(Handle));
 
+        /// <summary>Whether the bundle has hearing: sounds in the room are heard (Session.PushSound).</summary>
+        public bool HasHearing => Native.visavis_engine_has_hearing(Handle) != 0;
+
         /// <summary>Joints of a frame, parents before children; 0 is the hips.</summary>
         public int JointCount { get; }
 

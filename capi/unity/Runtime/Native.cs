@@ -8,7 +8,7 @@ namespace Visavis
     {
         // visavis.dll, libvisavis.so: what package.sh puts into the plugin folders.
         const string Library = "visavis";
-        public const uint AbiVersion = 0x10002;
+        public const uint AbiVersion = 0x10003;
 
         [DllImport(Library)] public static extern uint visavis_abi_version();
         [DllImport(Library)] public static extern Status visavis_check_abi(uint abiVersion);
@@ -21,6 +21,7 @@ namespace Visavis
         [DllImport(Library)] public static extern Status visavis_engine_from_memory([In] byte[] bytes, UIntPtr length, out EngineHandle engine);
         [DllImport(Library)] public static extern void visavis_engine_free(IntPtr engine);
         [DllImport(Library)] public static extern IntPtr visavis_engine_name(EngineHandle engine);
+        [DllImport(Library)] public static extern int visavis_engine_has_hearing(EngineHandle engine);
         [DllImport(Library)] public static extern uint visavis_engine_joint_count(EngineHandle engine);
         [DllImport(Library)] public static extern IntPtr visavis_engine_joint_name(EngineHandle engine, uint joint);
         [DllImport(Library)] public static extern Status visavis_engine_joint(EngineHandle engine, uint joint, out int parent, [Out] float[] offset);
@@ -37,6 +38,9 @@ namespace Visavis
         [DllImport(Library)] public static extern Status visavis_session_push_user_head(SessionHandle session, float x, float y, float z, double time);
         [DllImport(Library)] public static extern Status visavis_session_push_user_pose(SessionHandle session, float x, float y, float z, float qx, float qy, float qz, float qw, double time);
         [DllImport(Library)] public static extern Status visavis_session_dyadic(SessionHandle session, [Out] float[] shares, UIntPtr capacity, out UIntPtr count);
+        [DllImport(Library)] public static extern Status visavis_session_push_sound(SessionHandle session, uint id, IntPtr samples, UIntPtr count, uint rate, float x, float y, float z);
+        [DllImport(Library)] public static extern Status visavis_session_end_sound(SessionHandle session, uint id);
+        [DllImport(Library)] public static extern Status visavis_session_set_sensitivity(SessionHandle session, float sensitivity);
         [DllImport(Library)] public static extern Status visavis_session_set_gaze(SessionHandle session, float target);
         [DllImport(Library)] public static extern Status visavis_session_set_natural_gaze(SessionHandle session);
         [DllImport(Library)] public static extern Status visavis_session_set_guidance(SessionHandle session, float weight, float gaze);

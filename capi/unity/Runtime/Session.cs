@@ -6,7 +6,7 @@ namespace Visavis
     /// <summary>One conversation. Session world: metres, seconds, right-handed, Y up; times count from 0 at its start.</summary>
     /// <remarks>
     /// Pushes, commands and settings come from any thread, such as OnAudioFilterRead and a tracker's. They never wait for Poll or for each other and are never
-    /// refused; a block goes by what came before its Poll began. One thread at a time pushes the sound of a voice. Poll, Reset, WarmUp, SetFallback and Statistics
+    /// refused; a block goes by what came before its Poll began. One thread at a time pushes the sound of a voice or of a source. Poll, Reset, WarmUp, SetFallback and Statistics
     /// are one thread's at a time, else BusyException. After Dispose: ObjectDisposedException; a call under way ends first.
     /// </remarks>
     public sealed class Session : IDisposable
@@ -38,24 +38,30 @@ namespace Visavis
         /// <exception cref="ArgumentException">A bad rate: nothing was taken. Samples that are not finite: silence is in their place, all others were taken.</exception>
         public void PushAudio(Speaker speaker, float[] samples, int offset, int count, int rate)
         {
-            if (samples == null) throw new ArgumentNullException(nameof(samples));
-            if (offset < 0 || count < 0 || count > samples.Length - offset)
-                throw new ArgumentOutOfRangeException(nameof(count), count, "samples from offset on that lie in the array");
-            var pinned = GCHandle.Alloc(samples, GCHandleType.Pinned);
+            if (speaker != Speaker.Agent && speaker != Speaker.User) throw new ArgumentOutOfRangeException(nameof(speaker), speaker, "Agent or User");
+            var pinned = Pin(samples, offset, count, out var first);
             try
             {
-                // A pinned array of no elements may have no address.
-                var first = count == 0 ? new IntPtr(4) : Marshal.UnsafeAddrOfPinnedArrayElement(samples, offset);
                 var number = (UIntPtr)count;
                 var hertz = (uint)Math.Max(rate, 0);
                 Errors.Check(speaker == Speaker.Agent ? Native.visavis_session_push_agent_audio(handle, first, number, hertz)
-                    : speaker == Speaker.User ? Native.visavis_session_push_user_audio(handle, first, number, hertz)
-                    : throw new ArgumentOutOfRangeException(nameof(speaker), speaker, "Agent or User"));
+                    : Native.visavis_session_push_user_audio(handle, first, number, hertz));
             }
             finally
             {
                 pinned.Free();
             }
+        }
+
+        static GCHandle Pin(float[] samples, int offset, int count, out IntPtr first)
+        {
+            if (samples == null) throw new ArgumentNullException(nameof(samples));
+            if (offset < 0 || count < 0 || count > samples.Length - offset)
+                throw new ArgumentOutOfRangeException(nameof(count), count, "samples from offset on that lie in the array");
+            var pinned = GCHandle.Alloc(samples, GCHandleType.Pinned);
+            // A pinned array of no elements may have no address.
+            first = count == 0 ? new IntPtr(4) : Marshal.UnsafeAddrOfPinnedArrayElement(samples, offset);
+            return pinned;
         }
 
         public void PushAudio(Speaker speaker, float[] samples, int rate) => PushAudio(speaker, samples, 0, samples?.Length ?? 0, rate);
@@ -80,6 +86,37 @@ namespace Visavis
         /// <summary>The same with the head's rotation: a quaternion of about unit length, identity where the user faces +Z. Bundles of the kind `dram` see it.</summary>
         public void PushUserPose(float x, float y, float z, float qx, float qy, float qz, float qw, double time) =>
             Errors.Check(Native.visavis_session_push_user_pose(handle, x, y, z, qx, qy, qz, qw, time));
+
+        /// <summary>
+        /// A piece of what sound source `id` in the room gives off: mono samples of 8000 to 192000 Hz, pascals as they are 1 m from it (RMS 1 is 94 dB
+        /// SPL); x, y, z is where it is from now on, session world. The first piece sounds from the next block on, further ones follow it, up to ten
+        /// seconds ahead; none moves a source that sounds. Sixteen sound at once, the loudest ones.
+        /// </summary>
+        /// <exception cref="ArgumentException">
+        /// The bundle has no hearing (Engine.HasHearing) or the rate is bad: nothing was taken. A place that is not finite: sound of a source that has one
+        /// was taken. Samples that are not finite: silence is in their place.
+        /// </exception>
+        public void PushSound(uint id, float[] samples, int offset, int count, int rate, float x, float y, float z)
+        {
+            var pinned = Pin(samples, offset, count, out var first);
+            try
+            {
+                Errors.Check(Native.visavis_session_push_sound(handle, id, first, (UIntPtr)count, (uint)Math.Max(rate, 0), x, y, z));
+            }
+            finally
+            {
+                pinned.Free();
+            }
+        }
+
+        public void PushSound(uint id, float[] samples, int rate, float x, float y, float z) => PushSound(id, samples, 0, samples?.Length ?? 0, rate, x, y, z);
+
+        /// <summary>Ends a sound source at once.</summary>
+        /// <exception cref="ArgumentException">The bundle has no hearing.</exception>
+        public void EndSound(uint id) => Errors.Check(Native.visavis_session_end_sound(handle, id));
+
+        /// <summary>How much the agent minds sounds in the room: -1 dull, 0 neutral, 1 sensitive, up to 1.5 either way.</summary>
+        public void SetSensitivity(float sensitivity) => Errors.Check(Native.visavis_session_set_sensitivity(handle, sensitivity));
 
         /// <summary>0 averted to 1 sustained eye contact; null: what comes naturally.</summary>
         public void SetGaze(float? target) =>

@@ -50,6 +50,8 @@ namespace Visavis
         public float BudgetMs;
         public uint Reserved;
         public double VoiceAhead;
+        public float Sensitivity;
+        public uint Reserved2;
     }
 
     /// <summary>One frame without its joints, session world: visavis_frame.</summary>
@@ -94,5 +96,7 @@ namespace Visavis
         public ulong AgentNonFiniteSamples, AgentBadRateSamples, AgentContendedSamples;
         public ulong UserNonFiniteSamples, UserBadRateSamples, UserContendedSamples;
         public ulong GovernorFallbackBlocks;
+        public ulong SoundPieces, SoundStarted, SoundOverflowSamples, SoundClippedSamples, SoundNonFiniteSamples, SoundBadRateSamples;
+        public ulong SoundBadPlaces, SoundContendedSamples, SoundRefused, SoundReplaced;
     }
 }

@@ -45,6 +45,7 @@ namespace Visavis.Tests
                 BadInput(one);
             }
             Fallback();
+            Sounds();
             Disposal();
             Outlives();
         }
@@ -75,6 +76,59 @@ namespace Visavis.Tests
                 }
                 var stats = session.Statistics();
                 Check.That(fell > 0 && stats.GovernorFallbackBlocks == fell && stats.GovernorHeldBlocks == 0, "the fallback made " + fell + " blocks");
+            }
+        }
+
+        // Two blocks and more beside a bang, heard with a bundle with hearing beside the first one.
+        static ulong BesideABang(Engine engine, bool bang, float x, float sensitivity)
+        {
+            var sound = new float[9600];
+            for (int i = 0; i < sound.Length; i++) sound[i] = ((i * 7919) % 2000 - 1000) / 125f;
+            var options = Engine.Options();
+            options.Sensitivity = sensitivity;
+            ulong digest = 0xcbf29ce484222325u;
+            using (var session = engine.NewSession(options))
+            {
+                if (bang) session.PushSound(7, sound, 24000, x, 1, -2);
+                for (int k = 0; k < 4; k++)
+                {
+                    Check.That(session.Poll(1), "a block is due");
+                    digest = Check.Digest(digest, session.Joints);
+                }
+                Check.That(session.Statistics().SoundStarted == (bang ? 1u : 0u), "a source is counted");
+            }
+            return digest;
+        }
+
+        static void Sounds()
+        {
+            using (var engine = Engine.FromPath(System.IO.Path.Combine(System.IO.Path.GetDirectoryName(Check.Bundle), "hearing.safetensors")))
+            {
+                Check.That(engine.HasHearing && !Check.Tiny.HasHearing, "which bundle has hearing");
+                var heard = BesideABang(engine, true, 1, 0);
+                Check.That(heard == BesideABang(engine, true, 1, 0), "the same sound, the same motion");
+                Check.That(heard != BesideABang(engine, false, 1, 0) && heard != BesideABang(engine, true, -1, 0) && heard != BesideABang(engine, true, 1, 1),
+                    "a sound, its place and the sensitivity count");
+                var options = Engine.Options();
+                options.Sensitivity = 1.6f;
+                Check.Throws<ArgumentException>(() => engine.NewSession(options), "sensitivity");
+                using (Session session = engine.NewSession(), deaf = Check.Tiny.NewSession())
+                {
+                    Check.Throws<ArgumentException>(() => deaf.PushSound(1, new float[9], 24000, 0, 1, 2), "hearing");
+                    Check.Throws<ArgumentException>(() => deaf.EndSound(1), "hearing");
+                    Check.Throws<ArgumentException>(() => session.PushSound(1, new float[9], 24000, float.NaN, 1, 2), "metres");
+                    Check.Throws<ArgumentException>(() => session.PushSound(1, new float[9], 0, 0, 1, 2));
+                    Check.Throws<ArgumentException>(() => session.PushSound(1, new[] { 0, float.NaN }, 24000, 0, 1, 2));
+                    Check.Throws<ArgumentNullException>(() => session.PushSound(1, null, 24000, 0, 1, 2));
+                    Check.Throws<ArgumentOutOfRangeException>(() => session.PushSound(1, new float[8], 4, 5, 24000, 0, 1, 2));
+                    Check.Throws<ArgumentException>(() => session.SetSensitivity(float.NaN), "sensitivity");
+                    session.SetSensitivity(-1);
+                    session.PushSound(1, new float[0], 24000, 0, 1, 3);
+                    session.EndSound(1);
+                    session.EndSound(2);
+                    var stats = session.Statistics();
+                    Check.That(stats.SoundBadPlaces == 1 && stats.SoundBadRateSamples == 9 && stats.SoundNonFiniteSamples == 1, "counted");
+                }
             }
         }
 

@@ -11,11 +11,13 @@
 mod load;
 mod machine;
 mod sizes;
+mod sounds;
 mod stages;
 
 pub use load::{LoadOptions, Times, UnderLoad};
 pub use machine::{Machine, memory, read_limit};
 pub use sizes::Size;
+pub use sounds::{SoundOptions, WithSounds};
 pub use stages::{STAGES, StageTimes};
 
 use crate::contents::made_with;

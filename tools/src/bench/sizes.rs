@@ -3,7 +3,8 @@
 use std::sync::Arc;
 use visavis::internals::bundle::Tensors;
 use visavis::internals::config::{
-    AudioConfig, Config, ConvConfig, FORMAT, FlowConfig, Kind, PoseConfig, SessionConfig, StudentConfig, VaeConfig,
+    AudioConfig, Config, ConvConfig, FORMAT, FlowConfig, HearingConfig, Kind, PoseConfig, SessionConfig, StudentConfig,
+    VaeConfig,
 };
 use visavis::internals::kernels::{Kernels, Scheme};
 use visavis::{Engine, Error, ErrorKind, Joint, Networks, Result, Rig};
@@ -50,6 +51,17 @@ impl Size {
         Engine::from_tensors(self.config(), &Tensors::seeded(scheme), kernels, networks)
     }
 
+    /// As [`Size::engine`], with hearing as in [`HEARING`].
+    ///
+    /// # Errors
+    /// As [`Size::engine`].
+    pub fn engine_with_hearing(self, scheme: Scheme, kernels: Kernels, networks: Networks) -> Result<Arc<Engine>> {
+        let shapes = [(10, 5), (10, 5), (8, 4), (8, 4), (4, 2), (3, 1)];
+        let hearing = HearingConfig { audio: encoder(&shapes, &HEARING, 24), embed: 64 };
+        let config = Config { hearing: Some(hearing), ..self.config() };
+        Engine::from_tensors(config, &Tensors::seeded(scheme), kernels, networks)
+    }
+
     /// The bytes of a bundle with the weights of [`Size::engine`]: what loading takes can be
     /// measured on it.
     ///
@@ -93,6 +105,7 @@ impl Size {
             flow,
             dram: None,
             mospa: None,
+            hearing: None,
             student: Some(StudentConfig { tau_history: 0.9, guidance: 2.0, gaze_guidance: 1.5 }),
             session: SessionConfig {
                 guidance: 1.3,
@@ -131,16 +144,23 @@ fn flow(width: usize, window_blocks: usize) -> FlowConfig {
 /// Channels of the shipped model's encoder, 0.75 M parameters.
 const BASE_CHANNELS: [usize; 7] = [24, 48, 96, 160, 256, 256, 256];
 
-/// The encoder with these channels after each convolution.
+/// Channels of the encoder of sounds in the room; 24 features, embedded in 64.
+const HEARING: [usize; 6] = [8, 16, 24, 32, 48, 48];
+
+/// The voices' encoder with these channels after each convolution.
 fn audio(channels: [usize; 7], features: usize) -> AudioConfig {
-    let shapes = [(10, 5), (10, 5), (8, 4), (8, 4), (4, 2), (3, 1), (3, 1)];
+    encoder(&[(10, 5), (10, 5), (8, 4), (8, 4), (4, 2), (3, 1), (3, 1)], &channels, features)
+}
+
+/// An encoder of convolutions with these kernels and strides, and channels after each.
+fn encoder(shapes: &[(usize, usize)], channels: &[usize], features: usize) -> AudioConfig {
     let mut inputs = 1;
-    let layer = |((kernel, stride), outputs)| {
+    let layer = |(&(kernel, stride), &outputs): (&(usize, usize), &usize)| {
         let layer = ConvConfig { inputs, outputs, kernel, stride, residual: stride == 1 };
         inputs = outputs;
         layer
     };
-    AudioConfig { layers: shapes.into_iter().zip(channels).map(layer).collect(), features }
+    AudioConfig { layers: shapes.iter().zip(channels).map(layer).collect(), features }
 }
 
 /// The rig with further joints at the hands until there are `count`.

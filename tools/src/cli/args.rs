@@ -2,7 +2,7 @@
 
 use super::quantize::QuantizeArgs;
 use super::report::ReportArgs;
-use super::values::{Gaze, GuidanceArgs, gaze};
+use super::values::{Gaze, GuidanceArgs, gaze, sensitivity};
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -60,6 +60,10 @@ pub struct RunArgs {
     pub sampler: Sampler,
     #[command(flatten)]
     pub weights: GuidanceArgs,
+    /// How readily the agent reacts to sounds: dull, neutral, sensitive, or a number from -1.5 (dull
+    /// is -1) to 1.5
+    #[arg(long, value_name = "NAME", value_parser = sensitivity, default_value = "neutral", allow_negative_numbers = true)]
+    pub sensitivity: f32,
     /// Bundle [default: the shipped one, in models/ here, beside the program, or in its source
     /// folder]
     #[arg(long, value_name = "FILE")]
@@ -76,13 +80,17 @@ pub struct RunArgs {
 pub struct DemoArgs {
     #[command(flatten)]
     pub run: RunArgs,
+    /// A dog, a crash behind the agent and music interrupt; needs a bundle with hearing [default:
+    /// models/visavis-room-i8.safetensors]
+    #[arg(long)]
+    pub sounds: bool,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/demo")]
     pub out: PathBuf,
 }
 
 #[derive(Debug, Clone, Args)]
-#[group(id = "inputs", required = true, multiple = true, args = ["agent", "user", "user_path"])]
+#[group(id = "inputs", required = true, multiple = true, args = ["agent", "user", "user_path", "sound"])]
 pub struct GenerateArgs {
     /// The agent's voice: WAV, 8 to 192 kHz, int or float, mono or more; left out, it is absent
     #[arg(long, value_name = "WAV")]
@@ -94,6 +102,12 @@ pub struct GenerateArgs {
     /// agent starts at the origin of that world, on the floor y = 0, facing +z
     #[arg(long, value_name = "CSV")]
     pub user_path: Option<PathBuf>,
+    /// A sound in the room, for bundles with hearing: WAV file, where it is (metres, in that world,
+    /// +x is the agent's left at the start), when it begins (seconds), its source's number (each
+    /// sound is a source of its own), and how loud its loudest 125 ms are at 1 m (dB SPL; left out,
+    /// full scale is 1 pascal). As many as you like; sixteen sources sound at once
+    #[arg(long, value_name = "WAV@X,Y,Z[:t=S][:id=N][:db=L]")]
+    pub sound: Vec<String>,
     #[command(flatten)]
     pub run: RunArgs,
     /// Folder for the results
@@ -153,6 +167,7 @@ impl RunArgs {
             gaze: self.gaze.0,
             guidance: self.weights.guidance,
             gaze_guidance: self.weights.gaze_guidance,
+            sensitivity: self.sensitivity,
             ..SessionOptions::default()
         }
     }
@@ -176,6 +191,9 @@ impl RunArgs {
             ]);
         } else {
             facts.push(("generator", format!("{}, a step a frame", engine.kind())));
+        }
+        if engine.has_hearing() {
+            facts.push(("sensitivity", self.sensitivity.to_string()));
         }
         facts.extend([
             ("kernels", engine.kernels().level().to_string()),

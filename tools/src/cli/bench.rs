@@ -9,7 +9,9 @@ use std::sync::Arc;
 use std::time::Duration;
 use visavis::internals::kernels::{Kernels, Scheme};
 use visavis::{BundleFile, Engine, Networks, Result, Sampler};
-use visavis_tools::bench::{Bench, BenchOptions, LoadOptions, Machine, STAGES, Size, UnderLoad};
+use visavis_tools::bench::{
+    Bench, BenchOptions, LoadOptions, Machine, STAGES, Size, SoundOptions, UnderLoad, WithSounds,
+};
 use visavis_tools::contents::made_with;
 
 #[derive(Debug, Args)]
@@ -50,6 +52,11 @@ pub struct BenchArgs {
     /// are 133.3
     #[arg(long, value_name = "MS", default_value = "0", requires = "load", value_parser = milliseconds)]
     pub every: f64,
+    /// Measures blocks that hear N sources in the room and blocks that hear none, in turns: these
+    /// times alone. Or several numbers one after the other: 1,16. Seeded weights (--size) have
+    /// hearing then
+    #[arg(long, value_name = "N", num_args = 1.., value_delimiter = ',', value_parser = clap::builder::RangedU64ValueParser::<u32>::new().range(0..=16), conflicts_with_all = ["load", "sessions"])]
+    pub sounds: Vec<u32>,
     /// Leaves out the cold start, for which processes of their own load the bundle
     #[arg(long)]
     pub no_cold_start: bool,
@@ -100,6 +107,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     let started = std::time::Instant::now();
     let networks = args.networks.of(&args.sampler);
     let engine = match args.size {
+        Some(size) if !args.sounds.is_empty() => size.engine_with_hearing(args.scheme, Kernels::detect()?, networks)?,
         Some(size) => size.engine_with(args.scheme, Kernels::detect()?, networks)?,
         None => {
             let file = BundleFile::open(files::model(args.model.as_deref())?)?;
@@ -114,6 +122,9 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     let samplers = if engine.needs_sarah().is_ok() { &args.sampler[..] } else { &args.sampler[..1] };
     if !args.load.is_empty() {
         return under_load(args, samplers, &engine, &machine);
+    }
+    if !args.sounds.is_empty() {
+        return with_sounds(args, samplers, &engine, &machine);
     }
     for &sampler in samplers {
         for &threads in &args.threads {
@@ -188,6 +199,33 @@ fn under_load(args: &BenchArgs, samplers: &[Sampler], engine: &Arc<Engine>, mach
         let mut ratios = two.named();
         ratios.iter_mut().zip(one.named()).for_each(|((_, two), (_, one))| *two /= one);
         line("2 to 1", ratios, "");
+    }
+    print(&text)
+}
+
+/// Prints the times with and without sounds in the room.
+fn with_sounds(args: &BenchArgs, samplers: &[Sampler], engine: &Arc<Engine>, machine: &Machine) -> Result<()> {
+    let mut all = Vec::new();
+    for &sampler in samplers {
+        for &threads in &args.threads {
+            for &sources in &args.sounds {
+                let options = SoundOptions { sampler, threads, sources, blocks: args.blocks };
+                all.push(WithSounds::run(engine, options)?);
+            }
+        }
+    }
+    if args.json {
+        return print(&format!("{:#}\n", serde_json::json!({ "machine": machine, "with_sounds": all })));
+    }
+    let mut text = format!("{} ({} processors), {}\n", machine.cpu, machine.processors, engine.config().name);
+    for WithSounds { sampler, threads, sources, block_ms: [without, with], .. } in &all {
+        let _ = writeln!(text, "\n{sampler}, {threads} threads, {sources} sources");
+        for (name, times) in [("without", without), ("with", with)] {
+            let times = times.named().map(|(name, value)| format!("{name} {value:.2}"));
+            let _ = writeln!(text, "  {name:<9} {} ms", times.join(", "));
+        }
+        let more = 100.0 * (with.p50 / without.p50 - 1.0);
+        let _ = writeln!(text, "  more      {more:.1} % at the median, {:.2} ms", with.p50 - without.p50);
     }
     print(&text)
 }

@@ -1,11 +1,14 @@
 //! Where the files that come with the program are.
 
 use std::path::{Path, PathBuf};
-use visavis::{Error, ErrorKind, Result};
-use visavis_tools::offline::Conversation;
+use visavis::{Engine, Error, ErrorKind, Result};
+use visavis_tools::offline::{Conversation, Sound};
 
 /// The shipped bundles; the first that is there is the default.
 const MODELS: [&str; 2] = ["models/visavis-base-i8.safetensors", "models/visavis-base.safetensors"];
+
+/// The shipped bundle with hearing.
+const ROOM_MODEL: &str = "models/visavis-room-i8.safetensors";
 
 /// The bundle to use: `given`, else the shipped one.
 pub fn model(given: Option<&Path>) -> Result<PathBuf> {
@@ -19,6 +22,26 @@ pub fn model(given: Option<&Path>) -> Result<PathBuf> {
     }
 }
 
+/// The bundle with hearing to use: `given`, else the shipped one.
+pub fn room_model(given: Option<&Path>) -> Result<PathBuf> {
+    let advice = "; or name a bundle with hearing by --model (`visavis inspect` tells)";
+    let found = given.map_or_else(|| shipped(ROOM_MODEL), |path| Ok(path.to_path_buf()));
+    found.map_err(|tried| missing("the model with hearing", &tried, advice))
+}
+
+/// Makes sure that sounds would be heard with the bundle at `model`.
+pub fn hears(engine: &Engine, model: &Path) -> Result<()> {
+    if engine.has_hearing() {
+        return Ok(());
+    }
+    let message = format!(
+        "{} has no hearing, so that sounds in the room mean nothing to it; take {ROOM_MODEL}, or another bundle with hearing \
+         (`visavis inspect` tells)",
+        engine.name()
+    );
+    Err(Error::new(ErrorKind::Argument, message).with_path(model))
+}
+
 /// A file of the sample conversation.
 fn sample(name: &str) -> Result<PathBuf> {
     shipped(&format!("samples/{name}")).map_err(|tried| missing("the sample conversation", &tried, ""))
@@ -26,8 +49,13 @@ fn sample(name: &str) -> Result<PathBuf> {
 
 /// The sample conversation.
 pub fn conversation() -> Result<Conversation> {
+    interrupted(Vec::new())
+}
+
+/// The sample conversation with sounds in the room.
+pub fn interrupted(sounds: Vec<Sound>) -> Result<Conversation> {
     let [agent, user, path] = ["agent.wav", "user.wav", "user.csv"].map(sample);
-    Conversation::read(Some(&agent?), Some(&user?), Some(&path?))
+    Conversation::read_with(Some(&agent?), Some(&user?), Some(&path?), sounds)
 }
 
 /// An error if both names stand for one file: a mapped bundle must not be written to.

@@ -9,20 +9,26 @@ use visavis::stats::SessionStats;
 use visavis::{Engine, Result};
 use visavis_tools::export::viewer::Meta;
 use visavis_tools::metrics::Summary;
-use visavis_tools::offline::{self, Conversation, Outcome, OutputFolder};
+use visavis_tools::offline::{self, Conversation, Outcome, OutputFolder, Sound};
 
 pub fn run(args: &GenerateArgs) -> Result<()> {
     let out = OutputFolder::prepare(&args.out)?;
     let inputs = [&args.agent, &args.user, &args.user_path].map(|file| file.as_deref());
-    let talk = Conversation::read(inputs[0], inputs[1], inputs[2])?;
+    let sounds = args.sound.iter().map(|text| Sound::read(text)).collect::<Result<Vec<_>>>()?;
+    let titles: Vec<_> = sounds.iter().map(|sound| sound.name.clone()).collect();
+    let talk = Conversation::read_with(inputs[0], inputs[1], inputs[2], sounds)?;
     let name = |file: &Path| Some(file.file_name()?.to_string_lossy().into_owned());
-    let names: Vec<_> = inputs.into_iter().flatten().filter_map(name).collect();
+    let names: Vec<_> = inputs.into_iter().flatten().filter_map(name).chain(titles).collect();
     generate(&args.run, &talk, "Visavis", &names.join(", "), out)
 }
 
 /// Loads the model, runs the conversation, writes `out` and reports.
 pub fn generate(args: &RunArgs, talk: &Conversation, title: &str, subtitle: &str, out: OutputFolder) -> Result<()> {
-    let engine = Engine::load(files::model(args.model.as_deref())?)?;
+    let model = files::model(args.model.as_deref())?;
+    let engine = Engine::load(&model)?;
+    if !talk.sounds().is_empty() {
+        files::hears(&engine, &model)?;
+    }
     let mut session = engine.session(args.options())?;
     let mut line = ProgressLine::new();
     let outcome = offline::run(&mut session, talk, &mut |progress| line.show(progress))?;
@@ -98,7 +104,10 @@ fn variants(all: &[(&str, &str)]) -> String {
 /// What was odd about the inputs.
 fn notes(stats: &SessionStats) -> Vec<String> {
     let inputs = &stats.inputs;
+    let sounds = &inputs.sounds;
     let counts = [
+        (sounds.clipped_samples, "samples of sounds were louder than 64 pascals and clipped"),
+        (sounds.refused + sounds.replaced, "sources were dropped: sixteen sound at once, the loudest at the head"),
         (inputs.agent_voice.clipped_samples, "samples of the agent's voice were far beyond full scale and clipped"),
         (inputs.user_voice.clipped_samples, "samples of the user's voice were far beyond full scale and clipped"),
         (inputs.head.teleports, "times the user's head moved faster than anybody can; the way between was left out"),

@@ -24,6 +24,15 @@ pub(super) fn gaze(text: &str) -> Result<Gaze, String> {
     number(text, -1.0, 1.0).map(|g| Gaze(Some(g))).map_err(|e| format!("{e}, or off"))
 }
 
+pub(super) fn sensitivity(text: &str) -> Result<f32, String> {
+    match text {
+        "dull" => Ok(-1.0),
+        "neutral" => Ok(0.0),
+        "sensitive" => Ok(1.0),
+        _ => number(text, -1.5, 1.5).map_err(|e| format!("{e}, or dull, neutral, sensitive")),
+    }
+}
+
 fn weight(text: &str) -> Result<f32, String> {
     number(text, 0.0, 20.0)
 }
@@ -45,6 +54,11 @@ mod tests {
             assert!(gaze(bad).is_err(), "{bad}");
         }
         assert_eq!((gaze("off"), gaze("-1")), (Ok(Gaze(None)), Ok(Gaze(Some(-1.0)))));
+        assert_eq!(
+            ["dull", "neutral", "sensitive", "-1.5"].map(|text| sensitivity(text).unwrap()),
+            [-1.0, 0.0, 1.0, -1.5]
+        );
+        assert!(sensitivity("1.6").is_err() && sensitivity("loud").is_err());
         assert!(weight("20.5").is_err() && weight("inf").is_err());
     }
 }

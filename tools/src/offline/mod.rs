@@ -26,18 +26,22 @@
 mod csv;
 mod output;
 mod path;
+mod sound;
 mod wav;
 
 pub use csv::UserPath;
 pub use output::{FILES, OutputFolder};
 pub use path::for_session;
+pub use sound::Sound;
 pub use wav::Wav;
 
-use crate::recording::Recording;
+use crate::recording::{Recording, Sounds, Source};
+use std::ops::Range;
 use std::path::Path;
 use std::time::{Duration, Instant};
-use visavis::internals::frame::BLOCK_SAMPLES;
+use visavis::internals::frame::{BLOCK_SAMPLES, FRAME_SAMPLES};
 use visavis::internals::quant::Scene;
+use visavis::internals::session::Probe;
 use visavis::stats::SessionStats;
 use visavis::{BLOCK_FRAMES, Error, ErrorKind, FPS, Result, SAMPLE_RATE, Session};
 
@@ -45,13 +49,15 @@ use visavis::{BLOCK_FRAMES, Error, ErrorKind, FPS, Result, SAMPLE_RATE, Session}
 /// often than they are meant.
 pub const MAX_SECONDS: f64 = 2.0 * 3600.0;
 
-/// What one conversation sounds and looks like; at least one of the three is there, and it is
-/// longer than nothing.
+/// What one conversation sounds and looks like; at least one part is there, and it is longer than
+/// nothing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conversation {
     agent: Option<Vec<f32>>,
     user: Option<Vec<f32>>,
     path: Option<UserPath>,
+    /// Sounds in the room, each with the number of its source.
+    sounds: Vec<(u32, Sound)>,
 }
 
 impl Conversation {
@@ -62,11 +68,26 @@ impl Conversation {
     /// # Errors
     /// Those of the readers, and of [`Conversation::new`], naming the file.
     pub fn read(agent: Option<&Path>, user: Option<&Path>, path: Option<&Path>) -> Result<Self> {
+        Self::read_with(agent, user, path, Vec::new())
+    }
+
+    /// As [`Conversation::read`], with sounds in the room: without an `id` each is a source of its
+    /// own; sounds of one source are more than two blocks (0.27 s) apart.
+    ///
+    /// # Errors
+    /// As [`Conversation::read`]; [`ErrorKind::Argument`] for sounds of one source that are not.
+    pub fn read_with(
+        agent: Option<&Path>,
+        user: Option<&Path>,
+        path: Option<&Path>,
+        sounds: Vec<Sound>,
+    ) -> Result<Self> {
         let voice = |file: &Path| Wav::read(file)?.to_24k().map_err(|e| e.with_path(file));
         let talk = Self {
             agent: agent.map(voice).transpose()?,
             user: user.map(voice).transpose()?,
             path: path.map(UserPath::read).transpose()?,
+            sounds: numbered(sounds)?,
         };
         // The length is checked file by file, so that the error can name the one that is too long.
         for (file, seconds) in [agent, user, path].into_iter().zip(talk.lengths()) {
@@ -88,7 +109,7 @@ impl Conversation {
     /// is all there is and ends at or before 0 s; either when a part is longer than
     /// [`MAX_SECONDS`].
     pub fn new(agent: Option<Vec<f32>>, user: Option<Vec<f32>>, path: Option<UserPath>) -> Result<Self> {
-        let talk = Self { agent, user, path };
+        let talk = Self { agent, user, path, sounds: Vec::new() };
         talk.lengths().into_iter().flatten().try_for_each(check_length)?;
         talk.checked()
     }
@@ -98,7 +119,9 @@ impl Conversation {
             return Ok(self);
         }
         Err(match &self.path {
-            None => Error::new(ErrorKind::Argument, "nothing to generate from: give a voice or the user's path"),
+            None => {
+                Error::new(ErrorKind::Argument, "nothing to generate from: give a voice, the user's path or a sound")
+            }
             Some(path) => Error::new(
                 ErrorKind::UserPath,
                 format!(
@@ -109,10 +132,11 @@ impl Conversation {
         })
     }
 
-    /// Seconds of the agent's voice, the user's voice and the path.
-    fn lengths(&self) -> [Option<f64>; 3] {
+    /// Seconds of the agent's voice, the user's voice, the path and the sounds.
+    fn lengths(&self) -> [Option<f64>; 4] {
         let voice = |v: &Vec<f32>| v.len() as f64 / f64::from(SAMPLE_RATE);
-        [self.agent.as_ref().map(voice), self.user.as_ref().map(voice), self.path.as_ref().map(UserPath::end)]
+        let sounds = self.sounds.iter().map(|(_, sound)| sound.end()).reduce(f64::max);
+        [self.agent.as_ref().map(voice), self.user.as_ref().map(voice), self.path.as_ref().map(UserPath::end), sounds]
     }
 
     /// Length, seconds: that of the longest part.
@@ -147,9 +171,73 @@ impl Conversation {
         Scene::new(self.agent(), self.user(), heads, blocks.min(self.frames() / BLOCK_FRAMES), gaze)
     }
 
+    /// Sounds in the room, each with the number of its source.
+    pub fn sounds(&self) -> &[(u32, Sound)] {
+        &self.sounds
+    }
+
     /// The path of the user's head.
     pub fn path(&self) -> Option<&UserPath> {
         self.path.as_ref()
+    }
+}
+
+/// Sounds with the numbers of their sources.
+fn numbered(sounds: Vec<Sound>) -> Result<Vec<(u32, Sound)>> {
+    let given: Vec<_> = sounds.iter().filter_map(|sound| sound.id).collect();
+    let mut free = (0..).filter(|id| !given.contains(id));
+    let mut numbered: Vec<(u32, Sound)> = Vec::with_capacity(sounds.len());
+    for sound in sounds {
+        // There are more numbers than sounds.
+        let id = sound.id.or_else(|| free.next()).unwrap_or(u32::MAX);
+        let close =
+            |other: &Sound| blocks(other).start <= blocks(&sound).end && blocks(&sound).start <= blocks(other).end;
+        if let Some((_, other)) = numbered.iter().find(|(other, sound)| *other == id && close(sound)) {
+            let message = format!(
+                "the sounds {} and {} have one source, {id}, and are less than 0.27 s apart; give them ids of their own",
+                other.name, sound.name
+            );
+            return Err(Error::new(ErrorKind::Argument, message));
+        }
+        numbered.push((id, sound));
+    }
+    Ok(numbered)
+}
+
+/// The blocks in which a sound is heard, and one more.
+fn blocks(sound: &Sound) -> Range<usize> {
+    let start = first_sample(sound);
+    start / BLOCK_SAMPLES..(start + sound.samples.len()).div_ceil(BLOCK_SAMPLES) + 1
+}
+
+fn first_sample(sound: &Sound) -> usize {
+    (sound.start * f64::from(SAMPLE_RATE)).round() as usize
+}
+
+/// What a source gives off in block `block`, from the block's start on; none before the sound
+/// begins and after it has ended.
+fn piece(sound: &Sound, block: usize) -> Option<Vec<f32>> {
+    let (first, from) = (first_sample(sound), block * BLOCK_SAMPLES);
+    let silence = first.saturating_sub(from);
+    if silence >= BLOCK_SAMPLES {
+        return None;
+    }
+    let rest = sound.samples.get(from.saturating_sub(first)..).filter(|rest| !rest.is_empty())?;
+    let mut piece = vec![0.0; silence];
+    piece.extend_from_slice(&rest[..rest.len().min(BLOCK_SAMPLES - silence)]);
+    Some(piece)
+}
+
+/// What the agent hears of all sounds, the mean of its ears.
+struct HeardSounds(Vec<f32>);
+
+impl Probe for HeardSounds {
+    fn stage(&mut self, block: u64, name: &'static str, values: &[f32]) {
+        if let ("hearing.ears", Some(before)) = (name, block.checked_sub(1)) {
+            let (left, right) = values.split_at(BLOCK_SAMPLES);
+            let out = self.0.iter_mut().skip(before as usize * BLOCK_SAMPLES);
+            out.zip(left.iter().zip(right)).for_each(|(out, (l, r))| *out = (0.5 * (l + r)).clamp(-1.0, 1.0));
+        }
     }
 }
 
@@ -198,23 +286,40 @@ impl Outcome {
     }
 }
 
+/// The sounds of a conversation, for its recording.
+fn recorded(talk: &Conversation, heard: Vec<f32>) -> Option<Sounds> {
+    let source = |(_, sound): &(u32, Sound)| Source {
+        name: sound.name.clone(),
+        position: sound.place.as_vec3(),
+        seconds: [sound.start, sound.end()],
+    };
+    (!talk.sounds.is_empty()).then(|| Sounds { sources: talk.sounds.iter().map(source).collect(), heard })
+}
+
 /// Resets `session`, plays the whole conversation to it and returns the motion; `progress` is
 /// called after each block.
 ///
 /// Voices come a block ahead, as from text-to-speech; the session itself never uses the user's
-/// future.
+/// future. Sounds come block by block, and begin when they say, to the sample.
 ///
 /// # Errors
 /// Those of pushing and polling; none for finite voices and a session that was just made.
+/// [`ErrorKind::Argument`] for sounds where the bundle has no hearing.
 pub fn run(session: &mut Session, talk: &Conversation, progress: &mut dyn FnMut(Progress)) -> Result<Outcome> {
     session.reset()?;
+    let place = |sound: &Sound| sound.place.as_vec3();
+    for (id, sound) in &talk.sounds {
+        // An empty piece: whether it could be pushed at all.
+        session.push_sound(*id, &[], SAMPLE_RATE, place(sound))?;
+    }
+    let mut heard = HeardSounds(vec![0.0; if talk.sounds.is_empty() { 0 } else { talk.frames() * FRAME_SAMPLES }]);
     let total = talk.frames();
     let points = talk.path.as_ref().map(path::poses_for_session).unwrap_or_default();
     let mut points = points.into_iter().peekable();
     let mut voices = [talk.agent.as_deref(), talk.user.as_deref()].map(|v| v.unwrap_or_default().chunks(BLOCK_SAMPLES));
     let mut frames = Vec::with_capacity(total);
     let started = Instant::now();
-    for _ in 0..total.div_ceil(BLOCK_FRAMES) {
+    for block in 0..total.div_ceil(BLOCK_FRAMES) {
         let now = session.next_due();
         if let Some(samples) = voices[0].next() {
             session.push_agent_audio(samples, SAMPLE_RATE)?;
@@ -225,7 +330,13 @@ pub fn run(session: &mut Session, talk: &Conversation, progress: &mut dyn FnMut(
         while let Some((time, position, rotation)) = points.next_if(|(time, ..)| *time <= now) {
             session.push_user_pose(position, rotation, time)?;
         }
-        if let Some(block) = session.poll(now)? {
+        for (id, sound) in &talk.sounds {
+            if let Some(piece) = piece(sound, block) {
+                session.push_sound(*id, &piece, SAMPLE_RATE, place(sound))?;
+            }
+        }
+        let probe = (!talk.sounds.is_empty()).then_some(&mut heard as &mut dyn Probe);
+        if let Some(block) = session.poll_with(now, probe)? {
             let wanted = block.len().min(total - frames.len());
             frames.extend_from_slice(&block[..wanted]);
         }
@@ -240,7 +351,7 @@ pub fn run(session: &mut Session, talk: &Conversation, progress: &mut dyn FnMut(
         agent_voice: talk.agent.clone(),
         user_voice: talk.user.clone(),
         gaze_target: session.options().gaze,
-        sounds: None,
+        sounds: recorded(talk, heard.0),
     };
     Ok(Outcome { recording, stats: session.stats(), elapsed })
 }
@@ -289,5 +400,31 @@ mod tests {
         path.points().iter().for_each(|&(time, position)| track.push(position, time));
         let stats = track.stats();
         assert_eq!((stats.accepted, stats.teleports, stats.overwritten), (path.points().len() as u64, 0, 0));
+    }
+
+    #[test]
+    fn sounds_are_cut_at_blocks_and_begin_to_the_sample() {
+        let sound = |start: f64, samples: usize, id| Sound {
+            name: "bang".to_owned(),
+            samples: (0..samples).map(|i| 1.0 + i as f32).collect(),
+            place: glam::DVec3::ZERO,
+            start,
+            id,
+        };
+        let bang = sound(0.3, 5_000, None);
+        let pieces: Vec<_> = (0..6).map(|block| piece(&bang, block)).collect();
+        // 7200 samples: 800 before the end of the third block.
+        assert_eq!(
+            pieces.iter().map(|p| p.as_ref().map_or(0, Vec::len)).collect::<Vec<_>>(),
+            [0, 0, 3200, 3200, 1000, 0]
+        );
+        let all: Vec<_> = pieces.into_iter().flatten().flatten().collect();
+        assert!(all[..800].iter().all(|s| *s == 0.0) && all[800..] == bang.samples);
+        let talk = |sounds| Conversation::read_with(None, None, None, sounds);
+        let two = talk(vec![sound(0.0, 100, None), sound(0.0, 100, Some(0)), sound(1.0, 2_400, Some(0))]).unwrap();
+        assert_eq!(two.sounds().iter().map(|(id, _)| *id).collect::<Vec<_>>(), [1, 0, 0]);
+        assert!((two.seconds() - 1.1).abs() < 1e-9);
+        let e = talk(vec![sound(0.0, 100, Some(3)), sound(0.2, 100, Some(3))]).unwrap_err();
+        assert_eq!(e.kind(), ErrorKind::Argument);
     }
 }

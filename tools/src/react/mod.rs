@@ -4,9 +4,7 @@
 //! through the denoiser. The agent stands at the origin facing +Z at frame 0, which is where its
 //! ears stay for the rendering.
 
-mod sound;
-
-pub use sound::Sound;
+pub use crate::offline::Sound;
 
 use crate::recording::{Recording, Sounds, Source};
 use glam::Vec3;
@@ -94,7 +92,7 @@ pub fn run(reactor: &Reactor, sounds: &[Sound], options: &Options) -> Result<Out
     let source = |sound: &Sound| Source {
         name: sound.name.clone(),
         position: sound.place.as_vec3(),
-        seconds: [sound.start, (sound.start + sound.samples.len() as f64 / rate).min(end)],
+        seconds: [sound.start, sound.end().min(end)],
     };
     let sounds = Sounds {
         sources: sounds.iter().map(source).collect(),

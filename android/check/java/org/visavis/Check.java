@@ -9,7 +9,7 @@ import java.nio.ByteOrder;
 import java.nio.FloatBuffer;
 
 /**
- * Runs the tests: every static method whose name starts with "test" of the classes below, in order. Arguments: the tiny bundle, beside which dram-tcn.safetensors lies, the number
+ * Runs the tests: every static method whose name starts with "test" of the classes below, in order. Arguments: the tiny bundle, beside which dram-tcn.safetensors and hearing.safetensors lie, the number
  * of open-and-close cycles, and the number of blocks of a digest. Prints "digest NAME HEX" lines, for comparison between machines.
  */
 public final class Check {
@@ -59,6 +59,11 @@ public final class Check {
     /** One of the featherweight tier, which lies beside the first. */
     static VisavisEngine light() throws IOException {
         return VisavisEngine.fromFile(new File(bundle.getParentFile(), "dram-tcn.safetensors"));
+    }
+
+    /** One with hearing. */
+    static VisavisEngine hearing() throws IOException {
+        return VisavisEngine.fromFile(new File(bundle.getParentFile(), "hearing.safetensors"));
     }
 
     static FloatBuffer direct(int floats) {

@@ -85,6 +85,36 @@ final class ErrorTest {
         }
     }
 
+    static void testSounds() throws Exception {
+        try (VisavisEngine engine = Check.hearing();
+                VisavisEngine without = engine();
+                VisavisSession session = engine.newSession();
+                VisavisSession deaf = without.newSession()) {
+            float[] sound = {0, Float.NaN, 65};
+            throwsWith(ARGUMENT, "hearing", () -> deaf.pushSound(1, sound, 0, 1, 24_000, 0, 1, 2));
+            throwsWith(ARGUMENT, "hearing", () -> deaf.endSound(1));
+            throwsWith(ARGUMENT, "metres", () -> session.pushSound(1, sound, 0, 1, 24_000, Float.NaN, 1, 2));
+            throwsWith(ARGUMENT, "Hz", () -> session.pushSound(1, sound, 0, 1, 0, 0, 1, 2));
+            throwsWith(ARGUMENT, "negative", () -> session.pushSound(1, sound, 0, 1, -1, 0, 1, 2));
+            throwsWith(ARGUMENT, "1 of 3 pushed samples", () -> session.pushSound(1, sound, 0, 3, 24_000, 0, 1, 2));
+            throwsWith(ARGUMENT, "array has 3", () -> session.pushSound(1, sound, 1, 3, 24_000, 0, 1, 2));
+            throwsWith(ARGUMENT, "not direct", () -> session.pushSound(1, FloatBuffer.allocate(3), 24_000, 0, 1, 2));
+            throwsWith(NullPointerException.class, "null", () -> session.pushSound(1, null, 0, 0, 24_000, 0, 1, 2));
+            throwsWith(ARGUMENT, "sensitivity", () -> session.setSensitivity(1.6f));
+            throwsWith(ARGUMENT, "sensitivity", () -> session.setSensitivity(Float.NaN));
+            throwsWith(ARGUMENT, "sensitivity", () -> engine.newSession(new SessionOptions().sensitivity(Float.NaN)));
+            session.setSensitivity(-1);
+            session.endSound(1);
+            session.endSound(2);
+            SessionStats.Sounds sounds = session.stats().sounds;
+            Check.equal(1L, sounds.pieces);
+            Check.equal(1L, sounds.badPlaces);
+            Check.equal(1L, sounds.badRateSamples);
+            Check.equal(1L, sounds.nonFiniteSamples);
+            Check.equal(1L, sounds.clippedSamples);
+        }
+    }
+
     static void testClosedAndPanics() throws Exception {
         VisavisEngine engine = engine();
         VisavisSession session = engine.newSession();

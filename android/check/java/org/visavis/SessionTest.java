@@ -175,6 +175,44 @@ final class SessionTest {
         }
     }
 
+    /** The joints of a block beside a bang at (x, 1, -2), from a buffer or an array, if there is any. */
+    private static float[] besideABang(VisavisEngine engine, int kind, float x, float sensitivity) {
+        try (VisavisSession session = engine.newSession(new SessionOptions().sensitivity(sensitivity))) {
+            float[] bang = new float[9_600];
+            for (int i = 0; i < bang.length; i++) {
+                bang[i] = (float) ((i * 7919) % 2000 - 1000) / 125;
+            }
+            if (kind == 1) {
+                session.pushSound(-7, bang, 0, bang.length, 24_000, x, 1, -2);
+            } else if (kind == 2) {
+                FloatBuffer buffer = direct(bang.length);
+                buffer.put(bang);
+                buffer.flip();
+                session.pushSound(-7, buffer, 24_000, x, 1, -2);
+            }
+            float[] out = new float[session.layout().blockFloats()];
+            for (int k = 0; k < 4; k++) {
+                equal(4, session.poll(session.nextDueNanos(), out, 0));
+            }
+            SessionStats.Sounds sounds = session.stats().sounds;
+            isTrue(sounds.pieces == Math.min(kind, 1) && sounds.started == sounds.pieces && sounds.refused + sounds.replaced == 0, "counted");
+            return out;
+        }
+    }
+
+    static void testSoundsInTheRoom() throws Exception {
+        try (VisavisEngine engine = Check.hearing();
+                VisavisEngine deaf = engine()) {
+            isTrue(engine.hasHearing() && !deaf.hasHearing(), "which bundle has hearing");
+            float[] heard = besideABang(engine, 1, 1, 0);
+            isTrue(Arrays.equals(heard, besideABang(engine, 2, 1, 0)), "a buffer is an array");
+            isTrue(!Arrays.equals(heard, besideABang(engine, 0, 1, 0)), "a bang is heard");
+            isTrue(!Arrays.equals(heard, besideABang(engine, 1, -1, 0)), "its place counts");
+            isTrue(!Arrays.equals(heard, besideABang(engine, 1, 1, 1)), "sensitivity counts");
+            besideABang(deaf, 0, 0, 1);
+        }
+    }
+
     static void testLittleSoundAhead() throws Exception {
         try (VisavisEngine engine = engine();
                 VisavisSession session = engine.newSession(new SessionOptions().voiceAhead(0.5))) {

@@ -22,6 +22,14 @@ function createHud(d) {
   $("row-fit").hidden = d.dyadic?.every((shares) => shares) ?? false;
   if (d.dyadic) set("made-with", "Generator");
 
+  const labels = (d.sounds ?? []).map(({ name }) => Object.assign(document.createElement("div"), { className: "source-label", textContent: name, hidden: true }));
+  $("sources").append(...labels);
+  // Where a point above `p` is seen, as a transform of what stands there; null behind the eye.
+  const over = (view, p, up, width, height) => {
+    const at = project(view.matrix, add(p, [0, up, 0]));
+    return at[3] < 0.1 ? null : `translate(-50%, -100%) translate(${(0.5 + (0.5 * at[0]) / at[3]) * width}px, ${(0.5 - (0.5 * at[1]) / at[3]) * height}px)`;
+  };
+
   return {
     clock,
     draw(time, pose, view, width, height) {
@@ -48,11 +56,19 @@ function createHud(d) {
       scrub.style.setProperty("--done", `${(100 * time) / Math.max(d.duration, 1e-6)}%`);
       scrub.setAttribute("aria-valuetext", `${time.toFixed(2)} seconds of ${d.duration.toFixed(1)}`);
       const label = $("user-label");
-      const at = pose.user && view ? project(view.matrix, add(pose.user, [0, 0.2, 0])) : null;
-      label.hidden = !at || at[3] < 0.1;
+      const place = pose.user && view ? over(view, pose.user, 0.2, width, height) : null;
+      label.hidden = !place;
       if (label.hidden) return;
-      label.style.transform = `translate(-50%, -100%) translate(${(0.5 + (0.5 * at[0]) / at[3]) * width}px, ${(0.5 - (0.5 * at[1]) / at[3]) * height}px)`;
+      label.style.transform = place;
       set("user-distance", `${Math.hypot(pose.user[0] - pose.root[0], pose.user[2] - pose.root[2]).toFixed(1)} m`);
+    },
+    // Names of what sounds, at their places; `view` is null where no label is wanted.
+    sources(sources, view, width, height) {
+      sources.forEach(({ at, on }, i) => {
+        const place = on && view ? over(view, at, 0.22, width, height) : null;
+        labels[i].hidden = !place;
+        if (place) labels[i].style.transform = place;
+      });
     },
   };
 }

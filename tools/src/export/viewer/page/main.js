@@ -153,6 +153,8 @@ function start() {
     renderer.draw({ pose, views: [view], lines, fromUser, joints: state.joints, theme: theme() });
     const labelled = fromUser || clean ? null : view;
     hud.draw(state.time, pose, labelled, w, h);
+    hud.sources(sources, clean ? null : view, w, h);
+    page.dataset.sounding = sources.flatMap(({ on }, i) => (on ? [d.sounds[i].name] : [])).join(" ");
     whom.draw(pose, labelled, w, h);
     page.dataset.whom = pose.dyadic ? pose.dyadic[whom.joint ?? 0].toFixed(3) : "none";
     timeline.draw(state.time, theme());

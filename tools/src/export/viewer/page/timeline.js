@@ -1,4 +1,4 @@
-// The lanes at the foot of the page: both voices or what is heard, gaze, whom the body follows where that is told, and the play head. Click or drag to seek.
+// The lanes at the foot of the page: both voices or what is heard, gaze, whom the body follows where that is told, sounds in the room, and the play head. Click or drag to seek.
 
 function createTimeline(canvas, d, whom, onSeek) {
   const g = canvas.getContext("2d");
@@ -7,8 +7,9 @@ function createTimeline(canvas, d, whom, onSeek) {
     { name: "User", kind: "voice", samples: d.userVoice, colour: "--user" },
     { name: "Gaze", kind: "gaze" },
   ];
-  if (d.sounds) lanes.splice(0, 2, { name: "Heard", kind: "voice", samples: d.heard, colour: "--user" });
+  if (d.sounds && !d.agentVoice && !d.userVoice) lanes.splice(0, 2, { name: "Heard", kind: "voice", samples: d.heard, colour: "--user" });
   if (d.dyadic) lanes.push({ name: "Dyadic", kind: "dyadic" });
+  if (d.sounds) lanes.push({ name: "Sounds", kind: "sounds" });
   canvas.dataset.lanes = lanes.length;
   const still = document.createElement("canvas");
   let key = "";
@@ -42,6 +43,7 @@ function createTimeline(canvas, d, whom, onSeek) {
       s.fillRect(left, Math.round(middle), wide, 1);
       if (lane.kind === "gaze") return gaze(s, left, wide, middle, half, ratio, variable);
       if (lane.kind === "dyadic") return dyadic(s, left, wide, middle, half, ratio, variable);
+      if (lane.kind === "sounds") return sounds(s, left, wide, middle, half, ratio, variable);
       if (!lane.samples) {
         s.fillStyle = variable("--dim");
         return s.fillText("no voice", left + 8 * ratio, middle - 7 * ratio);
@@ -107,6 +109,28 @@ function createTimeline(canvas, d, whom, onSeek) {
     const of = joint === null ? "mean and largest" : whom.name(joint);
     s.fillText(`${of}, to ${Math.round(100 * top)} %`, left + wide, middle - half + 2 * ratio);
     s.textAlign = "left";
+  }
+
+  // A bar for each source while it sounds, with its name; those that sound together below each other.
+  const rows = [];
+  for (const source of [...(d.sounds ?? [])].sort((a, b) => a.seconds[0] - b.seconds[0])) {
+    const row = rows.find((others) => others[others.length - 1].seconds[1] <= source.seconds[0]);
+    if (row) row.push(source); else rows.push([source]);
+  }
+  function sounds(s, left, wide, middle, half, ratio, variable) {
+    const at = (seconds) => left + (wide * clamp(seconds, 0, d.duration)) / Math.max(d.duration, 1e-6), high = (2 * half) / rows.length;
+    rows.forEach((row, k) => row.forEach(({ name, seconds: [from, to] }) => {
+      const x = at(from), y = middle - half + k * high, w = Math.max(3 * ratio, at(to) - x);
+      s.fillStyle = css(SOUND);
+      s.beginPath();
+      s.roundRect(x, y, w, Math.max(2 * ratio, high - ratio), 3 * ratio);
+      s.fill();
+      if (high < 10 * ratio) return;
+      // Beside the bar where it does not fit in.
+      const inside = s.measureText(name).width + 8 * ratio < w;
+      s.fillStyle = inside ? "#1b1206" : variable("--dim");
+      s.fillText(name, inside ? x + 4 * ratio : x + w + 4 * ratio, y + 0.5 * high);
+    }));
   }
 
   const timeAt = (event) => {

@@ -75,6 +75,9 @@ function dyadicColour(share) {
   return lerp([0.29, 0.56, 0.98], [0.96, 0.36, 0.60], clamp(share, 0, 1));
 }
 
+// Colour of sounds in the room.
+const SOUND = [1, 0.62, 0.16];
+
 // How strongly that colour covers clothes, and skin.
 const WHOM = { body: 0.85, skin: 0.45 };
 

@@ -26,6 +26,8 @@ final class Native {
 
     static native boolean engineHasStudent(long engine);
 
+    static native boolean engineHasHearing(long engine);
+
     static native String[] engineJointNames(long engine);
 
     static native int[] engineJointParents(long engine);
@@ -40,7 +42,7 @@ final class Native {
 
     static native long sessionNew(long engine, long seed, int threads, long coreMask, String sampler, float gaze, float guidance,
             float gazeGuidance, float temperature, double x, double z, double yaw, boolean stance, boolean guard,
-            float budget, double voiceAhead);
+            float budget, double voiceAhead, float sensitivity);
 
     static native boolean sessionClose(long session);
 
@@ -53,6 +55,14 @@ final class Native {
     static native void clearVoice(long session, int voice);
 
     static native void setVoicePresent(long session, int voice, boolean present);
+
+    static native void pushSoundBuffer(long session, int id, FloatBuffer samples, int position, int count, int rate, float x, float y, float z);
+
+    static native void pushSoundArray(long session, int id, float[] samples, int offset, int count, int rate, float x, float y, float z);
+
+    static native void endSound(long session, int id);
+
+    static native void setSensitivity(long session, float sensitivity);
 
     static native void pushHead(long session, float x, float y, float z, double time);
 

@@ -19,6 +19,7 @@ public final class SessionOptions {
     boolean guard = true;
     float budget;
     double voiceAhead = 60;
+    float sensitivity;
 
     /** Same seed and same inputs: same motion, bit for bit. Default 0. */
     @NonNull
@@ -110,6 +111,13 @@ public final class SessionOptions {
     @NonNull
     public SessionOptions voiceAhead(double seconds) {
         voiceAhead = seconds;
+        return this;
+    }
+
+    /** How much the agent minds sounds in the room: -1 dull, 0 (default) neutral, 1 sensitive, numbers between and up to 1.5 either way. */
+    @NonNull
+    public SessionOptions sensitivity(float sensitivity) {
+        this.sensitivity = sensitivity;
         return this;
     }
 

@@ -41,6 +41,10 @@ public final class SessionStats {
     /** Dropped to make room before they were asked for. */
     public final long headOverwritten;
 
+    /** Sounds in the room. */
+    @NonNull
+    public final Sounds sounds;
+
     /** Blocks that took longer than the budget; this and the next five are 0 without a budget. */
     public final long governorMissed;
     /** Changes to a cheaper sampler. */
@@ -83,6 +87,43 @@ public final class SessionStats {
         }
     }
 
+    /** Counters of all sound sources in the room together; 0 where the bundle has no hearing. */
+    public static final class Sounds {
+        /** Pushes that were taken, whole or in part. */
+        public final long pieces;
+        /** Sources that began to sound. */
+        public final long started;
+        /** Dropped because a source was more than ten seconds ahead, samples of 24 kHz. */
+        public final long overflowSamples;
+        /** Clipped to 64 pascals, input samples: a sign of integers pushed as floats. */
+        public final long clippedSamples;
+        /** Not finite, which silence replaced, input samples. */
+        public final long nonFiniteSamples;
+        /** Pushed at a rate out of range and not taken, input samples. */
+        public final long badRateSamples;
+        /** Pushes with a place that is no number or absurdly far. */
+        public final long badPlaces;
+        /** Dropped because another thread was inside the same source's input and lost its core there for long, input samples. */
+        public final long contendedSamples;
+        /** Pushes and sources that were dropped because too many, or sixteen louder ones, sounded. */
+        public final long refused;
+        /** Sources that gave way to a louder one. */
+        public final long replaced;
+
+        Sounds(Row row) {
+            pieces = row.count();
+            started = row.count();
+            overflowSamples = row.count();
+            clippedSamples = row.count();
+            nonFiniteSamples = row.count();
+            badRateSamples = row.count();
+            badPlaces = row.count();
+            contendedSamples = row.count();
+            refused = row.count();
+            replaced = row.count();
+        }
+    }
+
     /** What the native library gives, read from the front. */
     private static final class Row {
         private final double[] values;
@@ -120,6 +161,7 @@ public final class SessionStats {
         headAbsurd = row.count();
         headTeleports = row.count();
         headOverwritten = row.count();
+        sounds = new Sounds(row);
         governorMissed = row.count();
         governorDown = row.count();
         governorUp = row.count();

@@ -74,7 +74,7 @@ public final class VisavisEngine implements AutoCloseable {
     public VisavisSession newSession(@NonNull SessionOptions options) {
         long session = Native.sessionNew(handle, options.seed, options.threads, options.coreMask, options.sampler.name, options.gaze,
                 options.guidance, options.gazeGuidance, options.temperature, options.startX, options.startZ, options.startYaw,
-                options.stance, options.guard, options.budget, options.voiceAhead);
+                options.stance, options.guard, options.budget, options.voiceAhead, options.sensitivity);
         return new VisavisSession(session, skeleton);
     }
 
@@ -93,6 +93,11 @@ public final class VisavisEngine implements AutoCloseable {
     /** Whether the bundle has the student that {@link Sampler#SINGLE} needs. */
     public boolean hasStudent() {
         return Native.engineHasStudent(handle);
+    }
+
+    /** Whether the bundle has hearing: sounds in the room are heard ({@link VisavisSession#pushSound}). */
+    public boolean hasHearing() {
+        return Native.engineHasHearing(handle);
     }
 
     /** The joints of its frames. */

@@ -7,10 +7,10 @@ import java.nio.FloatBuffer;
 /**
  * One conversation with one user.
  *
- * <p>Any thread may call. Pushes, commands to a voice, and settings (the methods push, finish, clear, set and report, but for
+ * <p>Any thread may call. Pushes, commands to a voice, and settings (the methods push, finish, clear, end, set and report, but for
  * setFallback) never wait, neither for a
  * block that another thread computes nor for each other; a block goes by what came before its poll began, and the same inputs give the same
- * motion, whichever threads they come from. A voice is one stream: one thread pushes its sound, while commands may come from others. All
+ * motion, whichever threads they come from. A voice is one stream, and so is a sound source: one thread pushes its sound, while commands may come from others. All
  * other calls take turns, and so may wait for a block's time.
  *
  * <p>Times are nanoseconds of session time: 0 when the session is made or reset. {@link #sessionTimeNanos()} is a clock of that kind; a
@@ -80,6 +80,48 @@ public final class VisavisSession implements AutoCloseable {
     /** Drops all sound of the agent that has not been used, as when it is interrupted. */
     public void clearAgentAudio() {
         Native.clearVoice(handle, AGENT);
+    }
+
+    /**
+     * Appends to what a sound source in the room gives off: mono samples, pascals as they are 1 m from it (RMS 1 is 94 dB SPL). The first piece of a
+     * source, and the first after it ran dry, sounds from the next block on; further pieces follow it without a gap, up to ten seconds ahead (more is
+     * dropped and counted). No samples move a source that sounds. Sixteen sources sound at once: one more takes the place of the quietest at the agent's
+     * head, if it is louder. One thread pushes a source's sound.
+     *
+     * @param id the source, any number
+     * @param rate samples a second, 8000 to 192000
+     * @param x where the source is from now on, world metres
+     * @throws IllegalArgumentException where the bundle has no hearing ({@link VisavisEngine#hasHearing}), for a rate out of range or a buffer that is
+     *     not direct (nothing is taken), a place that is not finite (sound of a source that has a place is taken), or samples that are not finite (they
+     *     become silence, all others are taken)
+     * @throws IllegalStateException when this session is closed
+     */
+    public void pushSound(int id, @NonNull FloatBuffer samples, int rate, float x, float y, float z) {
+        checked(samples);
+        Native.pushSoundBuffer(handle, id, samples, samples.position(), samples.remaining(), rate, x, y, z);
+    }
+
+    /** As {@link #pushSound(int, FloatBuffer, int, float, float, float)}, from a part of an array. */
+    public void pushSound(int id, @NonNull float[] samples, int offset, int count, int rate, float x, float y, float z) {
+        Native.pushSoundArray(handle, id, samples, offset, count, rate, x, y, z);
+    }
+
+    /**
+     * Ends a sound source at once: what no block has heard of it is dropped. Without effect where it does not sound.
+     *
+     * @throws IllegalArgumentException where the bundle has no hearing
+     */
+    public void endSound(int id) {
+        Native.endSound(handle, id);
+    }
+
+    /**
+     * Sets how much the agent minds sounds in the room from the next block on: -1 dull, 0 neutral, 1 sensitive, numbers between and up to 1.5 either way.
+     *
+     * @throws IllegalArgumentException outside -1.5 to 1.5
+     */
+    public void setSensitivity(float sensitivity) {
+        Native.setSensitivity(handle, sensitivity);
     }
 
     /** Makes the agent's voice present (silent until something is pushed) or absent (until the next push). */

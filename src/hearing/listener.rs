@@ -1,0 +1,144 @@
+//! From sources to what a block is told of them.
+
+use super::SoundStats;
+use super::head::{Head, level};
+use super::input::SoundInput;
+use super::sources::Sources;
+use crate::audio::{AudioEncoder, AudioWeights};
+use crate::config::HearingConfig;
+use crate::error::Result;
+use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES, FRAME_SAMPLES, Root, Transform};
+use crate::kernels::Exec;
+use glam::Vec3;
+
+/// Level at an ear that is 0 to the network, and dB that are 1.
+const MIDDLE: f64 = 60.0;
+const UNIT: f64 = 20.0;
+/// Where the encoder's input bends, pascals.
+const SQUASH: f32 = 0.2;
+
+/// One session's hearing. Allocates when made and never after.
+pub struct Hearing {
+    sources: Sources,
+    encoder: AudioEncoder,
+    ears: Box<[[f32; BLOCK_SAMPLES]; 2]>,
+    /// What the encoder hears.
+    mixed: Box<[f32; BLOCK_SAMPLES]>,
+    /// `[4, features]`.
+    features: Vec<f32>,
+    /// `[S]`.
+    vector: Vec<f32>,
+    /// Whether there was anything to listen to in the block before.
+    open: bool,
+    /// Whether the block that was listened to last was heard.
+    heard: bool,
+}
+
+impl Hearing {
+    /// Takes all memory: 32 streams of ten seconds.
+    ///
+    /// # Errors
+    /// As [`AudioEncoder::new`].
+    pub fn new(config: &HearingConfig) -> Result<Self> {
+        Ok(Self {
+            sources: Sources::new(),
+            encoder: AudioEncoder::new(&config.audio)?,
+            ears: Box::new([[0.0; BLOCK_SAMPLES]; 2]),
+            mixed: Box::new([0.0; BLOCK_SAMPLES]),
+            features: vec![0.0; BLOCK_FRAMES * config.audio.features],
+            vector: vec![0.0; config.width()],
+            open: false,
+            heard: false,
+        })
+    }
+
+    /// The end that is pushed into.
+    pub fn input(&self) -> SoundInput {
+        self.sources.input()
+    }
+
+    /// Takes notice of what was pushed; the agent stands at `root`, and `block` is due.
+    pub fn begin(&mut self, block: u64, root: &Root) {
+        self.sources.begin(block, [root.x, 1.6, root.z]);
+    }
+
+    /// Whether any sound has been pushed.
+    pub fn is_present(&self) -> bool {
+        self.sources.is_present()
+    }
+
+    /// Hears what sounded in `block`, in whose frames the head joint was at `heads`.
+    pub fn listen(&mut self, exec: &mut Exec, weights: &AudioWeights, block: u64, heads: &[Transform; BLOCK_FRAMES]) {
+        let Self { sources, encoder, ears, mixed, features, vector, open, heard } = self;
+        *heard = sources.is_present();
+        if !*heard {
+            return;
+        }
+        if !std::mem::replace(open, true) {
+            encoder.reset();
+        }
+        ears.as_flattened_mut().fill(0.0);
+        sources.hear(block, &heads.each_ref().map(Head::new), ears);
+        let [left, right] = &**ears;
+        for ((mixed, left), right) in mixed.iter_mut().zip(left).zip(right) {
+            let middle = 0.5 * (left + right);
+            *mixed = middle / (SQUASH + middle.abs());
+        }
+        encoder.encode(exec, weights, &mixed[..], features);
+        vector[..features.len()].copy_from_slice(features);
+        let levels = &mut vector[features.len()..][..2 * BLOCK_FRAMES];
+        let frames = left.chunks_exact(FRAME_SAMPLES).zip(right.chunks_exact(FRAME_SAMPLES));
+        for (levels, (left, right)) in levels.chunks_exact_mut(2).zip(frames) {
+            let scaled = [left, right].map(|ear| ((level(ear) - MIDDLE) / UNIT).clamp(-2.0, 3.5) as f32);
+            levels.copy_from_slice(&scaled);
+        }
+    }
+
+    /// Lets `block` go by unheard; what is heard next starts a new signal.
+    pub fn skip(&mut self, block: u64) {
+        (self.open, self.heard) = (false, false);
+        self.sources.skip(block);
+    }
+
+    /// Whether the last block was listened to, and anything had been pushed.
+    pub fn has_heard(&self) -> bool {
+        self.heard
+    }
+
+    /// What the left and the right ear heard of it, `[2, 3200]` pascals.
+    pub fn ears(&self) -> &[f32] {
+        self.ears.as_flattened()
+    }
+
+    /// Its features, `[4, features]`.
+    pub fn features(&self) -> &[f32] {
+        &self.features
+    }
+
+    /// Its sound vector, `[S]`, with the agent's root at its end.
+    pub fn vector(&mut self, root: &Root, sensitivity: f32) -> &[f32] {
+        let rest = &mut self.vector[self.features.len() + 2 * BLOCK_FRAMES..];
+        let place = self.sources.salient().map_or([0.0; 5], |place| {
+            let local = root.to_local(Vec3::from(place.map(|v| v as f32)));
+            let [x, z] = [local.x, local.z].map(f64::from);
+            let rho = (x * x + z * z).sqrt();
+            let [sin, cos] = if rho < 1e-3 { [0.0, 1.0] } else { [x / rho, z / rho] };
+            let far = libm::log2(rho.max(0.3)) - 1.0;
+            [1.0, sin as f32, cos as f32, far as f32, local.y - 1.5]
+        });
+        rest[..5].copy_from_slice(&place);
+        rest[5] = sensitivity;
+        &self.vector
+    }
+
+    /// Starts anew: nothing was pushed. Waits for pushes that are under way.
+    pub fn reset(&mut self) {
+        self.sources.reset();
+        (self.open, self.heard) = (false, false);
+    }
+
+    /// Counters since the start.
+    pub fn stats(&self) -> SoundStats {
+        self.sources.stats()
+    }
+}

@@ -1,0 +1,22 @@
+//! Sounds in the room: from sources at places to what the agent's two ears hear of them.
+//!
+//! ```text
+//! push: id, f32, ──> SoundInput ────────> Sources ────────> head ────────> Hearing ──────> sound vector
+//! any rate, place    resampler, 10 s      16 that sound,    two ears at    encoder,        of a block
+//!                    for each of 32       their salience    the agent's    levels, place
+//! ```
+//!
+//! Samples are pascals as they are 1 m from the source: RMS 1 is 94 dB SPL.
+
+mod head;
+mod input;
+mod listener;
+mod sources;
+mod stats;
+
+pub use input::SoundInput;
+pub use listener::Hearing;
+pub use stats::SoundStats;
+
+#[cfg(test)]
+mod tests;
