@@ -17,7 +17,7 @@ HEAD = rig.INDEX["head"]
 RATE, FRAME = 24000, 800
 BEND = RATE * RADIUS / SOUND       # of the shadow filter, in samples
 SQUASH = 0.2                       # pascals that the encoder hears as one half
-FALL, KNOWN = 0.5, 35.0            # dB a frame by which a source is forgotten, dB from which its place is known
+FALL, KNOWN, HOLD = 1.5, 35.0, 60  # dB a frame by which a source is forgotten, dB from which its place is known, frames for which it stays so
 WARM = 16                          # frames of silence that the encoder has heard before it begins
 
 
@@ -91,10 +91,13 @@ def hear(sources, middle, left):
         salience[i, s.first:s.first + len(level)] = level
         for t in range(s.first + 1, frames):
             salience[i, t] = max(salience[i, t], salience[i, t - 1] - FALL)
-    best = salience.argmax(0)
-    known = salience.max(0) >= KNOWN
-    places = np.array([s.place for s in sources] + [np.zeros(3)])
-    return Heard(ears, np.clip((decibels(ears).T - 60) / 20, -2, 3.5), places[best] * known[:, None], known)
+    place, known, held = np.zeros((frames, 3)), np.zeros(frames, bool), HOLD
+    for t, best in enumerate(salience.argmax(0)):
+        loud = salience[best, t] >= KNOWN
+        held = 0 if loud else held + 1
+        known[t] = held <= HOLD
+        place[t] = sources[best].place if loud else place[t - 1] * known[t]
+    return Heard(ears, np.clip((decibels(ears).T - 60) / 20, -2, 3.5), place, known)
 
 
 def squashed(ears):
