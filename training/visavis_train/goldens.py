@@ -153,11 +153,11 @@ def compute(b, blocks=20, seed=7):
 def room_sounds():
     """A burst close by, a buzz on the other side at the same time, and a quiet tone later."""
     r, t = np.random.default_rng(3), np.arange(9000) / 24000
-    burst = 20 * r.standard_normal(5000) * np.exp(-np.arange(5000) / 900)
+    burst = r.standard_normal(5000) * np.exp(-np.arange(5000) / 900)
     buzz = 0.5 * np.sign(np.sin(2 * np.pi * 180 * t))
     tone = 0.02 * np.sin(2 * np.pi * 700 * t[:6000])
     at = lambda block, wave, *place: ears.Source(4 * block, wave.astype(np.float32), np.array(place))
-    return [at(2, burst, 1.2, 1.5, -1.0), at(3, buzz, -2.5, 0.4, 2.0), at(9, tone, 0.3, 1.7, 4.0)]
+    return [at(2, burst, 1.2, 1.5, -1.0), at(3, buzz, -2.5, 0.4, 2.0), at(15, tone, 0.3, 1.7, 4.0)]
 
 
 def heard_by(session, sounds):
