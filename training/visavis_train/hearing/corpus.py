@@ -19,6 +19,7 @@ from . import ears
 from .events import Room
 
 SHARES = {"train": 1.0, "val": 0.06, "test": 0.10}     # of --hours
+STARTLED = plausible.Limits(speed=9.0, accel=230.0, toe=-0.01, trunk=0.08, trunk_share=0.03)     # arms that fly up, legs that hurry away
 EVENT = ("kind", "reaction", "name", "onset", "end", "begin", "until", "moved")
 _made = {}
 
@@ -42,7 +43,7 @@ def talk(data, split, index, frames):
         rng = np.random.default_rng([17, build.SPLITS.index(split), index, attempt])
         room = Room(rng, frames, heard, dances, GENRES[index % 3])
         clip = simulate.simulate_clip(rng, frames, src, (0.35 + index * 0.6180339887) % 1.0, (0.5 + index * 0.7548776662) % 1.0, index % 6 == 5, room)
-        if not (reasons := plausible.faults(clip.positions, clip.rotations, plausible.SIMULATED)):
+        if not (reasons := plausible.faults(clip.positions, clip.rotations, STARTLED)):
             return clip, room
     raise RuntimeError(f"clip {index} of {split}: no plausible draw: {', '.join(sorted(set(reasons)))}")
 

@@ -18,6 +18,7 @@ RATE, FRAME = 24000, 800
 BEND = RATE * RADIUS / SOUND       # of the shadow filter, in samples
 SQUASH = 0.2                       # pascals that the encoder hears as one half
 FALL, KNOWN, HOLD = 1.5, 35.0, 60  # dB a frame by which a source is forgotten, dB from which its place is known, frames for which it stays so
+SILENT = (10 * np.log10(1e-7) + 94 - 60) / 20     # level of silence, as networks take it
 WARM = 16                          # frames of silence that the encoder has heard before it begins
 
 

@@ -156,7 +156,7 @@ class Room:
                 self._reach(arms, np.clip(size, 0, 1) * self._bump(e.begin + 1, 6, 10, 26), GUARD)
             elif e.reaction == "cover":
                 length = max(e.until - e.begin - 18, 12)
-                share = self._bump(e.begin, int(13 * PACE[self.genre]), length, 20)
+                share = self._bump(e.begin, int(17 * PACE[self.genre]), length, 20)
                 nod += self._duck(own, share, 0.22, 0.02, 0.20)
                 self._reach(arms, share, EARS)
             elif e.reaction == "run":

@@ -104,7 +104,10 @@ class FlowNet(nn.Module):
         out = [user * flag[USER], self.embed_agent(cond.agent) * flag[AGENT], self.embed_voice(cond.voice) * flag[VOICE],
                self.embed_gaze(cond.gaze) * flag[GAZE], cond.flags]
         if self.sound_features:
-            out += [self.embed_sound["2"](gelu(self.embed_sound["0"](cond.sound))) * cond.heard, cond.heard]
+            if cond.sound is None:
+                out.append(torch.zeros(*cond.flags.shape[:-1], self.input_sound.in_features, device=cond.flags.device))
+            else:
+                out += [self.embed_sound["2"](gelu(self.embed_sound["0"](cond.sound))) * cond.heard, cond.heard]
         return torch.cat(out, -1)
 
     def tokens(self, z, conditioning):
