@@ -32,7 +32,8 @@ def events(corpus, split, cache):
     state, out = Windows(cache, BLOCKS, 0, 0, 0, 0, jitter=False), []
     names = torch.load(cache, mmap=True, weights_only=True)["names"]
     for row in state.segments[::2].tolist():              # one phase of two
-        clip, first, _, length = row
+        clip, length = row[0], row[3]
+        first = row[1] - int(state.starts[clip])
         if not names[clip].startswith("hear_"):
             continue
         meta = store.load(os.path.join(corpus, split, names[clip]), False).meta
