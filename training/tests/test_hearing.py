@@ -165,7 +165,7 @@ def write_cache(path, hears, clips=2, frames=400):
         levels[100:130] = 0.5
         levels[500:530] = 0.5
         known = levels[:, 0] > 0
-        state |= dict(sound=torch.randn(n, 3).half(), levels=levels, source=torch.randn(n, 3), known=known, hears=torch.ones(clips, dtype=torch.bool),
+        state |= dict(sound=torch.randn(n, 3).half(), levels=levels, source=torch.randn(n, 3), known=known, reacts=known, hears=torch.ones(clips, dtype=torch.bool),
                       sensitivity=torch.tensor([-1.0, 1.0]), silence=torch.full((3,), 0.25))
     os.makedirs(path, exist_ok=True)
     for split in ("train", "val"):

@@ -81,20 +81,20 @@ def features(audio, clip, frames):
 
 @torch.no_grad()
 def rooms(clips, encoder, gaze):
-    """What was heard in the room in each clip: features [N, D_s] f16, levels [N, 2], source [N, 3], known [N], sensitivity [clips], those of silence
-    [D_s]; and the gaze score [N], its mean elsewhere in the clip while the body reacts: a target is for conversation."""
+    """What was heard in the room in each clip: features [N, D_s] f16, levels [N, 2], source [N, 3], known [N], where the body reacts [N], sensitivity
+    [clips], features of silence [D_s]; and the gaze score [N], its mean elsewhere in the clip while the body reacts: a target is for conversation."""
     frames, told = [], gaze.clone()
     sensitivity = torch.zeros(len(clips))
     for i, path in enumerate(clips.paths):
         with np.load(path.replace(".safetensors", ".npz")) as kept:
             wave = torch.from_numpy(kept["wave"]).float() / 32767
-            frames.append([ears.listen(encoder, wave).half()] + [torch.from_numpy(kept[k]) for k in ("levels", "place", "known")])
-            part, reacts = slice(int(clips.starts[i]), int(clips.starts[i + 1])), torch.from_numpy(kept["reacts"])
+            frames.append([ears.listen(encoder, wave).half()] + [torch.from_numpy(kept[k]) for k in ("levels", "place", "known", "reacts")])
+            part, reacts = slice(int(clips.starts[i]), int(clips.starts[i + 1])), frames[-1][-1]
             sensitivity[i] = float(kept["sensitivity"])
         if (~reacts).any():
             told[part] = torch.where(reacts, gaze[part][~reacts].mean(), gaze[part])
-    sound, levels, source, known = (torch.cat(x) for x in zip(*frames))
-    return {"sound": sound, "levels": levels, "source": source, "known": known, "sensitivity": sensitivity, "hears": torch.ones(len(clips), dtype=torch.bool),
+    sound, levels, source, known, reacts = (torch.cat(x) for x in zip(*frames))
+    return {"sound": sound, "levels": levels, "source": source, "known": known, "reacts": reacts, "sensitivity": sensitivity, "hears": torch.ones(len(clips), dtype=torch.bool),
             "silence": ears.listen(encoder, torch.zeros(8 * ears.FRAME))[-1], "gaze": told}
 
 
@@ -108,7 +108,7 @@ def join(caches, split):
             raise SystemExit("caches to be joined must have one standard: --standard FLOW")
         frames = int(p["starts"][-1])
         empty = {} if hearing is None else {k: torch.zeros(len(p["names"]) if k in ("sensitivity", "hears") else frames, *hearing[k].shape[1:], dtype=hearing[k].dtype)
-                                            for k in ("sound", "levels", "source", "known", "sensitivity", "hears")}
+                                            for k in ("sound", "levels", "source", "known", "reacts", "sensitivity", "hears")}
         for name in ("z", "has", "still", "roots", "user", "gaze", "agent", "voice", *empty):
             out.setdefault(name, []).append(p[name] if name in p else empty[name])
         out["names"] += p["names"]

@@ -41,7 +41,7 @@ class Windows:
         self.weights = self.segments[:, 3].float()
         self.sound_features = state["sound"].shape[1] if "sound" in state else 0
         if self.sound_features:
-            for name in ("sound", "levels", "source", "known", "hears", "sensitivity", "silence"):
+            for name in ("sound", "levels", "source", "known", "reacts", "hears", "sensitivity", "silence"):
                 setattr(self, name, state[name].to(self.device))
             self.weights = self.weights * torch.where(state["hears"][self.segments[:, 0]], sounds, 1.0)
         spans = list(zip(self.starts[:-1].tolist(), self.starts[1:].tolist()))
@@ -100,6 +100,12 @@ class Windows:
     def stillness(self, segment, at):
         """Share of each block's frames [B, K] in which both hands are still."""
         return self.still[self.frames(segment, at)[:, 4:]].float().unflatten(1, (self.blocks, 4)).mean(-1)
+
+    def reacting(self, segment, at):
+        """Share of each block's frames [B, K] in which the body reacts to a sound."""
+        if not self.sound_features:
+            return 0.0
+        return self.reacts[self.frames(segment, at)[:, 4:]].float().unflatten(1, (self.blocks, 4)).mean(-1)
 
     def hear(self, segment, at):
         """Agent's and user's features [B, K, 4 D_a] each, straight from the voices."""
