@@ -1,4 +1,4 @@
-//! After the first push of a voice, pushing and setting allocate nothing: proved with an allocator
+//! After the first push of a voice or of a sound source, pushing and setting allocate nothing: proved with an allocator
 //! that counts, thread by thread.
 
 mod common;
@@ -50,13 +50,16 @@ fn pushing_allocates_nothing_after_the_first() {
                 visavis_session_push_user_head(session, 0.0, 1.6, 1.5, i as f64 * 0.01),
                 visavis_session_finish_audio(session, 0),
                 visavis_session_clear_audio(session, 1),
+                visavis_session_push_sound(session, 7, sound.as_ptr(), i, 48_000, 1.0, 1.0, -2.0),
+                visavis_session_end_sound(session, 8),
+                visavis_session_set_sensitivity(session, 1.0),
                 visavis_session_set_gaze(session, 0.5),
                 visavis_session_set_sampler(session, VisavisSamplerKind::Midpoint as i32, 1),
                 visavis_session_set_budget(session, 50.0),
                 visavis_session_report_block_time(session, 1.0),
             ]
         };
-        assert_eq!(all, [VisavisStatus::Ok; 9]);
+        assert_eq!(all, [VisavisStatus::Ok; 12]);
     };
     assert!(calls(|| push(1)) > 0, "the first makes resamplers, and the allocator counts");
     assert_eq!(calls(|| (1..500).for_each(push)), 0);

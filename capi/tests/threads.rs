@@ -42,6 +42,10 @@ fn two_push_from_one_buffer_while_a_third_polls() {
                             visavis_session_finish_audio(session, thread),
                             visavis_session_set_audio_present(session, 1 - thread, i32::from(i % 50 > 0)),
                             visavis_session_set_gaze(session, 0.5),
+                            visavis_session_push_sound(session, 1 + thread as u32, buffer, 960, 48_000, 1.0, 1.0, -2.0),
+                            visavis_session_push_sound(session, 100 + i as u32, buffer, 96, 24_000, 0.0, 1.0, 9.0),
+                            visavis_session_end_sound(session, 2 - thread as u32),
+                            visavis_session_set_sensitivity(session, 1.0 - thread as f32),
                             visavis_session_set_natural_gaze(session),
                             visavis_session_set_guidance(session, 1.3, 2.0),
                             visavis_session_set_sampler(session, VisavisSamplerKind::Midpoint as i32, 1),
@@ -49,7 +53,7 @@ fn two_push_from_one_buffer_while_a_third_polls() {
                             visavis_session_report_block_time(session, 1.0),
                         ]
                     };
-                    assert_eq!(all, [VisavisStatus::Ok; 11]);
+                    assert_eq!(all, [VisavisStatus::Ok; 15]);
                 }
             });
         }

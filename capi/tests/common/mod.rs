@@ -3,10 +3,11 @@
 use std::ptr::{null, null_mut};
 use visavis_c::*;
 
-/// An engine of the tiny bundle and a session with default options, for the test to free.
+/// An engine of the tiny bundle with hearing and a session with default options, for the test to
+/// free.
 pub fn tiny() -> (*mut VisavisEngine, *mut VisavisSession) {
     let bundle =
-        std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/goldens/tiny.safetensors")).expect("a bundle");
+        std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/goldens/hearing.safetensors")).expect("a bundle");
     let (mut engine, mut session) = (null_mut(), null_mut());
     // SAFETY: a slice, places for pointers, an engine that lives on.
     unsafe {
