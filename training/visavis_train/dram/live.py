@@ -41,9 +41,11 @@ class Live:
         self.std = (p - p[:, :1] * torch.tensor([1.0, 0.0, 1.0])).std(0).clamp(min=0.02)
 
     def __call__(self, step, batch):
-        window = self.data.sample(batch, train.FIRST + 1)
-        with mixed("cpu"):
-            near = train.losses(self.net, window, pose.Layout(), 0)[0]
+        parts = {}
+        if step % 2 == 0:
+            window = self.data.sample(batch, train.FIRST + 1)
+            with mixed("cpu"):
+                parts["near"] = 2 * train.losses(self.net, window, pose.Layout(), 0)[0]
         y, roots, w = self.agents.stretch(self.net)
         made = alike.Body(y, roots, w.head)
         with torch.no_grad():
@@ -51,8 +53,8 @@ class Live:
         seen = w.flags[:, [2, 4]]
         gaze, slow = alike.own_scores(made.score[:, PAST:], self.agents.score, w.wanted, seen, self.agents.chosen, w.gaze[:, PAST:])
         self.agents.score = slow
-        parts = {"near": near, "gaze": gaze, "speeds": alike.alike(made, real, alike.doing(w)), "poses": alike.poses(made, real, self.std),
-                 "place": placed(roots[:, PAST:], w.roots[:, PAST:]), "feet": alike.feet(made)}
+        parts |= {"gaze": gaze, "speeds": alike.alike(made, real, alike.doing(w)), "poses": alike.poses(made, real, self.std),
+                  "place": placed(roots[:, PAST:], w.roots[:, PAST:]), "feet": alike.feet(made)}
         voice = nets.voice(w.agent.float(), w.flags[:, None, :1].expand(-1, y.shape[1], -1))
         truth, own = self.critic.see(real, voice), self.critic.see(made, voice)
         fixed = {k: v.detach() for k, v in self.critic.named_parameters()}
@@ -66,7 +68,7 @@ class Live:
 
 
 @torch.no_grad()
-def judged(net, data, frames=300, windows=24):
+def judged(net, data, frames=240, windows=16):
     """Free-running figures on held-out clips."""
     out = {}
     for gaze in (None, 0.0, 0.9):
@@ -74,7 +76,7 @@ def judged(net, data, frames=300, windows=24):
         out |= {f"{k} {gaze}": row[k] for k in ("gaze",)}
         if gaze is None:
             out |= {k: row[k] for k in ("stillness", "hand m/s", "wrist talking", "wrist not", "foot slide", "root m/s", "distance m", "floor mm")}
-    e, _ = measure.position_errors(net, pose.Layout(), data, 64)
+    e, _ = measure.position_errors(net, pose.Layout(), data, 24)
     return out | {"ape": e.mean().item()}
 
 
