@@ -136,6 +136,7 @@ def fake_arrays(folder, frames=420):
     made = {"y": y.numpy(), "roots": roots.numpy(), "head": head, "forward": np.tile([0, 0, -1.0], (frames, 1)), "turned": zero() + 1, "gaze": zero(),
             "agent": g.standard_normal((frames, 6)), "voice": g.standard_normal((frames, 6)), "has": zero(2) + 1, "speaks": zero(), "hears": zero(), "nods": zero()}
     made["hears"][100:160] = made["speaks"][80:120] = made["nods"][200:230] = True
+    np.save(folder / "hush.npy", np.full(6, 0.25, np.float32))
     for split in ("train", "val"):
         (folder / split).mkdir()
         for name, v in made.items():
@@ -189,6 +190,10 @@ def test_agents_live_on_in_their_own_motion(kind, tmp_path):
     for t in range(agents.PAST, agents.PAST + 8):
         walked = roll.advance(walked, second[:, t].detach())
     assert (walked - after[:, -1].detach()).abs().max() < 1e-5
+    pool.hushed[1] = pool.fixed[2] = True
+    given = pool._window(torch.arange(6), pool.at, 4)
+    assert (given.agent[1] == 0.25).all() and (given.voice[1] == 0.25).all() and not (given.agent[2] == 0.25).any()
+    assert (given.head[2] == pool.seat[2]).all() and torch.equal(given.head[1], split.head[int(pool.at[1]):int(pool.at[1]) + 4])
     kept = agents.Agents(net, split, 6, 8, short=10 ** 9)
     kept.load_state_dict(pool.state_dict())
     torch.manual_seed(1)

@@ -21,7 +21,7 @@ from . import alike, evaluate, measure, nets, pose, roll, train
 from .agents import PAST, Agents
 from .data import Split
 
-WEIGHTS = {"near": 1.0, "speeds": 1.0, "poses": 1.0, "gaze": 6.0, "place": 1.0, "feet": 2.0, "critic": 0.5}
+WEIGHTS = {"near": 1.0, "speeds": 1.0, "poses": 1.0, "gaze": 10.0, "place": 2.0, "feet": 2.0, "critic": 0.5}
 
 
 def placed(roots, there):
@@ -32,7 +32,7 @@ def placed(roots, there):
 
 
 class Live:
-    """The losses of a step."""
+    """The losses of a step; no `critic`, none of its."""
 
     def __init__(self, net, critic, agents, data):
         self.net, self.critic, self.agents, self.data = net, critic, agents, data
@@ -55,6 +55,8 @@ class Live:
         self.agents.score = slow
         parts |= {"gaze": gaze, "speeds": alike.alike(made, real, alike.doing(w)), "poses": alike.poses(made, real, self.std),
                   "place": placed(roots[:, PAST:], w.roots[:, PAST:]), "feet": alike.feet(made)}
+        if self.critic is None:
+            return parts, 0.0
         voice = nets.voice(w.agent.float(), w.flags[:, None, :1].expand(-1, y.shape[1], -1))
         truth, own = self.critic.see(real, voice), self.critic.see(made, voice)
         fixed = {k: v.detach() for k, v in self.critic.named_parameters()}
@@ -97,14 +99,14 @@ def main():
     if layout != pose.Layout() or start["variant"] != "dram":
         raise SystemExit(f"{args.init} is {start['variant']} of layout {start['layout']}; agents need dram of the whole body")
     net.train()
-    agents, critic = Agents(net, data, args.agents, args.frames), alike.Critic(start["features"] + 1)
+    agents, critic = Agents(net, data, args.agents, args.frames), alike.Critic(start["features"] + 1) if weights["critic"] else None
     live = Live(net, critic, agents, data)
-    loop = Loop(Team(1), net, args, warmup=50, average=0.998, beside={"critic": critic}, memory=agents,
+    loop = Loop(Team(1), net, args, warmup=50, average=0.998, beside={"critic": critic} if critic else {}, memory=agents,
                 **{k: start[k] for k in ("backbone", "sizes", "variant", "layout", "features")})
     for step in loop:
         parts, told = live(step, args.batch)
         loop.update(sum(weights[k] * v for k, v in parts.items()) + told, told=told, **parts)
-        loop.report(25, lambda net: judged(net, held), 250)
+        loop.report(25, lambda net: judged(net, held), 500)
     loop.finish(lambda net: judged(net, held))
 
 
