@@ -124,19 +124,22 @@ impl Sources {
             let changed = reading.changes != owner.changes();
             // The sound first: who sees it, sees where it is.
             let cut = reading.stream.look();
+            // A slot that changed hands meanwhile is looked at with the next block.
+            let late = slot.owner().changes() != owner.changes();
             if changed {
                 (reading.changes, reading.id, reading.place) = (owner.changes(), owner.id(), None);
             }
-            reading.place = slot.last_place().or(reading.place);
-            let source = self.sources.iter_mut().find(|source| source.slot == Some(i));
-            if let (Some(source), Some(place)) = (source, reading.place) {
-                if changed || cut {
-                    source.slot = None;
-                } else {
-                    source.place = place;
-                }
+            let over = changed || cut || late;
+            reading.dry |= over;
+            let place = if late { None } else { slot.last_place() };
+            reading.place = place.or(reading.place);
+            if let Some(source) = self.sources.iter_mut().find(|source| source.slot == Some(i)) {
+                source.slot = source.slot.filter(|_| !over);
+                source.place = place.filter(|_| !over).unwrap_or(source.place);
             }
-            reading.dry |= changed || cut;
+            if late {
+                continue;
+            }
             if !reading.dry && reading.from < block && reading.stream.ahead() < BLOCK_SAMPLES as u64 {
                 // The last samples are with the resampler, which waits for more.
                 reading.stream.input().finish();
