@@ -136,7 +136,7 @@ test("late blocks are left to the fallback, whose frames tell whom the joints fo
   assert.equal(governor.fallbackBlocks, fell);
   assert.equal(governor.heldBlocks, 0);
   await assert.rejects(session.reportBlockTime(-1), kind("argument"));
-  await assert.rejects(session.reportBlockTime(NaN), kind("argument"));
+  assert.throws(() => session.reportBlockTime(NaN), kind("argument"));
   engine.close();
   await assert.rejects(engine.loadFallback(light), kind("closed"));
 });
