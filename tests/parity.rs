@@ -7,6 +7,7 @@ mod common;
 
 use common::{Golden, dram, dram_in, max_error, tiny};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use visavis::internals::config::CleanHistory;
 use visavis::internals::kernels::KvDtype;
 use visavis::internals::kernels::Scheme;
@@ -31,10 +32,26 @@ fn stages(golden: &Golden, sampler: Sampler, cache: KvDtype) -> BTreeMap<&'stati
 }
 
 fn stages_with(golden: &Golden, sampler: Sampler, given: Diagnostics) -> BTreeMap<&'static str, Vec<f32>> {
-    let engine = tiny();
+    stages_of(&tiny(), golden, sampler, given)
+}
+
+fn stages_of(
+    engine: &Arc<Engine>,
+    golden: &Golden,
+    sampler: Sampler,
+    given: Diagnostics,
+) -> BTreeMap<&'static str, Vec<f32>> {
     let gaze = Some(golden.values("gaze")[0]);
     let diagnostics = Diagnostics { anchoring: Anchoring::Never, bridge: false, ..given };
-    let options = SessionOptions { sampler, gaze, stance: false, guard: false, diagnostics, ..Default::default() };
+    let options = SessionOptions {
+        sampler,
+        gaze,
+        stance: false,
+        guard: false,
+        sensitivity: 0.5,
+        diagnostics,
+        ..Default::default()
+    };
     let mut session = engine.session(options).expect("session");
     let mut noise = golden.values("eps_idle");
     noise.extend(golden.values("eps"));
@@ -44,8 +61,14 @@ fn stages_with(golden: &Golden, sampler: Sampler, given: Diagnostics) -> BTreeMa
     for (i, p) in golden.values("user_path").chunks_exact(3).enumerate() {
         session.push_user_head(glam::Vec3::from_slice(p), i as f64 / f64::from(FPS)).expect("head");
     }
+    // Sounds, where the engine hears any: each before the block that it begins with.
+    let begins = if engine.has_hearing() { golden.values("sounds.blocks") } else { Vec::new() };
     let mut stages = Stages::default();
-    for _ in 0..golden.get("eps").0[0] {
+    for block in 0..golden.get("eps").0[0] {
+        for (i, _) in begins.iter().enumerate().filter(|(_, begin)| **begin as usize == block) {
+            let place = glam::Vec3::from_slice(&golden.values("sounds.places")[3 * i..]);
+            session.push_sound(i as u32, &golden.values(&format!("sounds.{i}")), 24_000, place).expect("a sound");
+        }
         let now = session.next_due();
         session.poll_with(now, Some(&mut stages)).expect("poll").expect("due");
     }
@@ -85,6 +108,46 @@ fn every_stage_equals_pytorch() {
         let dot: f32 = a.iter().zip(b).map(|(a, b)| a * b).sum();
         assert!(dot.abs() > 1.0 - 1e-6, "rotation {a:?} is not {b:?}");
     }
+}
+
+/// The tiny bundle with hearing, and three sources of which each stands out in its turn.
+#[test]
+fn hearing_equals_pytorch() {
+    let engine = Engine::load(common::golden_path("hearing.safetensors")).expect("the tiny bundle with hearing loads");
+    let golden = Golden::named("hearing.out.safetensors");
+    let ours =
+        stages_of(&engine, &golden, Sampler::Midpoint4, Diagnostics { cache: KvDtype::F32, ..Default::default() });
+    let heard = golden.values("conditioning.heard");
+    let first = heard.iter().position(|heard| *heard > 0.0).expect("something is heard");
+    let (blocks, width) = (golden.get("eps").0[0], golden.get("conditioning.sound").0[1]);
+    let features = golden.get("hearing.features").0[1];
+    let ears: Vec<f32> = {
+        // Frames 8 to 31 of [frame, ear, sample] in the order of blocks.
+        let all = golden.values("hearing.ears");
+        let frame = |t: usize, ear: usize| &all[(2 * (t - 8) + ear) * 800..][..800];
+        let blocks = (2..8).flat_map(|block| [0, 1].map(|ear| (block, ear)));
+        blocks.flat_map(|(block, ear)| (4 * block..4 * block + 4).flat_map(move |t| frame(t, ear))).copied().collect()
+    };
+    assert_eq!(first, 3, "the golden file's first sound begins with block 2");
+    let checks = [
+        ("hearing.ears", ears),
+        ("hearing.features", golden.values("hearing.features")[4 * (first - 1) * features..].to_vec()),
+        ("conditioning.sound", golden.values("conditioning.sound")[first * width..].to_vec()),
+        ("x1", (0..blocks).flat_map(|k| golden.values(&format!("x1.{k}"))).collect()),
+        ("latents", golden.values("latents")),
+        ("roots", golden.values("roots")),
+        ("positions", golden.values("positions")),
+    ];
+    for (name, expected) in checks {
+        let ours = if name == "hearing.ears" { &ours[name][..expected.len()] } else { &ours[name] };
+        let error = max_error(ours, &expected);
+        println!("{name}: {error:e}");
+        assert!(error < TOLERANCE, "{name} differs by {error}");
+    }
+    let student =
+        stages_of(&engine, &golden, Sampler::Single, Diagnostics { cache: KvDtype::F32, ..Default::default() });
+    let error = max_error(&student["latents"], &golden.values("student"));
+    assert!(error < TOLERANCE, "the student differs by {error}");
 }
 
 #[test]

@@ -9,8 +9,8 @@ use visavis::internals::kernels::Kernels;
 use visavis::internals::pose::feature_count;
 use visavis::{BundleFile, Engine, Networks};
 
-/// The bundle of the tests: the real networks with few channels and random weights.
-pub const TINY: &[u8] = include_bytes!("../../tests/goldens/tiny.safetensors");
+/// The bundle of the tests with hearing: the real networks with few channels and random weights.
+pub const TINY: &[u8] = include_bytes!("../../tests/goldens/hearing.safetensors");
 
 /// Those of the featherweight tier, with dilated convolutions and with LSTM; the rig is [`TINY`]'s.
 pub const DRAM: [&[u8]; 2] = [

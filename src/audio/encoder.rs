@@ -77,6 +77,26 @@ impl AudioEncoder {
         }
     }
 
+    /// What it remembers of the signal so far.
+    pub fn context(&self) -> Vec<f32> {
+        self.inputs.iter().flat_map(|input| &input.data[..input.context * input.conv.inputs]).copied().collect()
+    }
+
+    /// Goes on from what an encoder of the same configuration remembered.
+    ///
+    /// # Panics
+    /// When it is another configuration's.
+    pub fn set_context(&mut self, context: &[f32]) {
+        let mut rest = context;
+        for input in &mut self.inputs {
+            let own = &mut input.data[..input.context * input.conv.inputs];
+            let (part, others) = rest.split_at(own.len());
+            own.copy_from_slice(part);
+            rest = others;
+        }
+        assert!(rest.is_empty(), "a context of this configuration");
+    }
+
     /// Encodes `samples` (24 kHz mono, a multiple of 800), which follow those of the call before,
     /// into one feature vector a frame: `out` is row-major `[samples.len() / 800, features]`.
     /// Vector `t` depends on samples before `800 (t + 1)` only.

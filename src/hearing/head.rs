@@ -6,8 +6,6 @@
 use crate::audio::head::{BEND, NEAREST, RADIUS, SPEED, around, brightness};
 use crate::frame::{FRAME_SAMPLES, SAMPLE_RATE, Transform};
 
-/// Height of the head's centre over the head joint, along the head, metres.
-const CENTRE: f64 = 0.06;
 /// Samples before a frame that its own sound may be delayed by: the longest delay is 15.7.
 pub(super) const PAST: usize = 20;
 
@@ -33,13 +31,13 @@ pub(super) struct Path {
 }
 
 impl Head {
-    /// That of the head joint's transform.
-    pub(super) fn new(joint: &Transform) -> Self {
+    /// That of the head joint's transform; the centre is `height` metres over it, along the head.
+    pub(super) fn new(joint: &Transform, height: f64) -> Self {
         let [x, y, z, w] = joint.rotation.to_array().map(f64::from);
         let up = [2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)];
         let left = [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)];
         let at = joint.position.to_array();
-        Self { centre: [0, 1, 2].map(|i| f64::from(at[i]) + CENTRE * up[i]), left }
+        Self { centre: [0, 1, 2].map(|i| f64::from(at[i]) + height * up[i]), left }
     }
 
     /// How the place `source` (world metres) is heard.

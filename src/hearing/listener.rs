@@ -14,6 +14,8 @@ use glam::Vec3;
 /// Level at an ear that is 0 to the network, and dB that are 1.
 const MIDDLE: f64 = 60.0;
 const UNIT: f64 = 20.0;
+/// Silence that the encoder has heard before it begins: more than it remembers.
+const WARM_BLOCKS: usize = 4;
 /// Where the encoder's input bends, pascals.
 const SQUASH: f32 = 0.2;
 
@@ -21,6 +23,9 @@ const SQUASH: f32 = 0.2;
 pub struct Hearing {
     sources: Sources,
     encoder: AudioEncoder,
+    /// What the encoder remembers of silence, which it begins with.
+    quiet: Vec<f32>,
+    height: f64,
     ears: Box<[[f32; BLOCK_SAMPLES]; 2]>,
     /// What the encoder hears.
     mixed: Box<[f32; BLOCK_SAMPLES]>,
@@ -35,17 +40,25 @@ pub struct Hearing {
 }
 
 impl Hearing {
-    /// Takes all memory: 32 streams of ten seconds.
+    /// Takes all memory: 32 streams of ten seconds. The head's centre is `height` metres over the head
+    /// joint, along the head. The encoder hears silence on `exec`, whose width is at least its own.
     ///
     /// # Errors
     /// As [`AudioEncoder::new`].
-    pub fn new(config: &HearingConfig) -> Result<Self> {
+    pub fn new(exec: &mut Exec, config: &HearingConfig, weights: &AudioWeights, height: f32) -> Result<Self> {
+        let mut encoder = AudioEncoder::new(&config.audio)?;
+        let (silence, mut features) = ([0.0; BLOCK_SAMPLES], vec![0.0; BLOCK_FRAMES * config.audio.features]);
+        exec.begin();
+        (0..WARM_BLOCKS).for_each(|_| encoder.encode(exec, weights, &silence, &mut features));
+        exec.end();
         Ok(Self {
             sources: Sources::new(),
-            encoder: AudioEncoder::new(&config.audio)?,
+            quiet: encoder.context(),
+            encoder,
+            height: f64::from(height),
             ears: Box::new([[0.0; BLOCK_SAMPLES]; 2]),
             mixed: Box::new([0.0; BLOCK_SAMPLES]),
-            features: vec![0.0; BLOCK_FRAMES * config.audio.features],
+            features,
             vector: vec![0.0; config.width()],
             open: false,
             heard: false,
@@ -62,23 +75,23 @@ impl Hearing {
         self.sources.begin(block, [root.x, 1.6, root.z]);
     }
 
-    /// Whether any sound has been pushed.
-    pub fn is_present(&self) -> bool {
-        self.sources.is_present()
+    /// Whether any sound has begun by `block`.
+    pub fn has_begun(&self, block: u64) -> bool {
+        self.sources.have_begun(block)
     }
 
     /// Hears what sounded in `block`, in whose frames the head joint was at `heads`.
     pub fn listen(&mut self, exec: &mut Exec, weights: &AudioWeights, block: u64, heads: &[Transform; BLOCK_FRAMES]) {
-        let Self { sources, encoder, ears, mixed, features, vector, open, heard } = self;
-        *heard = sources.is_present();
+        let Self { sources, encoder, quiet, height, ears, mixed, features, vector, open, heard } = self;
+        *heard = sources.have_begun(block);
         if !*heard {
             return;
         }
         if !std::mem::replace(open, true) {
-            encoder.reset();
+            encoder.set_context(quiet);
         }
         ears.as_flattened_mut().fill(0.0);
-        sources.hear(block, &heads.each_ref().map(Head::new), ears);
+        sources.hear(block, &heads.each_ref().map(|joint| Head::new(joint, *height)), ears);
         let [left, right] = &**ears;
         for ((mixed, left), right) in mixed.iter_mut().zip(left).zip(right) {
             let middle = 0.5 * (left + right);
@@ -100,7 +113,7 @@ impl Hearing {
         self.sources.skip(block);
     }
 
-    /// Whether the last block was listened to, and anything had been pushed.
+    /// Whether the last block was listened to, and any sound had begun.
     pub fn has_heard(&self) -> bool {
         self.heard
     }

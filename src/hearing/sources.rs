@@ -21,7 +21,9 @@ const INBOX: usize = 128;
 /// What stands out by less than this is not known, dB SPL at the head.
 pub(super) const KNOWN: f64 = 35.0;
 /// What stood out fades by this much a frame, dB.
-const FADE: f64 = 0.5;
+const FADE: f64 = 1.5;
+/// Frames for which the place of what stood out last stays known.
+const HOLD: u32 = 60;
 
 /// A slot as the reader knows it.
 struct Reading {
@@ -45,6 +47,8 @@ struct Source {
     place: [f64; 3],
     /// How much it stands out, dB SPL at the head; as long as it has not begun, by its first frame.
     salience: f64,
+    /// The same in each frame of the last block.
+    course: [f64; BLOCK_FRAMES],
     /// Whether it has not begun, and did not sound lately either.
     new: bool,
     trail: Trail,
@@ -52,6 +56,16 @@ struct Source {
     rings: bool,
     /// Whether blocks went by unheard: the trail is cold.
     lost: bool,
+}
+
+impl Source {
+    /// Four frames in which nothing of it is heard.
+    fn fade(&mut self) {
+        for course in &mut self.course {
+            self.salience -= FADE;
+            *course = self.salience;
+        }
+    }
 }
 
 /// All sources of a session. Allocates when made and never after.
@@ -63,7 +77,11 @@ pub(super) struct Sources {
     sources: Vec<Source>,
     /// A source's sound: [`PAST`] samples before a block, and the block.
     sound: Box<[f32; PAST + BLOCK_SAMPLES]>,
-    present: bool,
+    /// The block that the first sound of all began with.
+    first: Option<u64>,
+    /// What stood out last, while it is known, and the frames since then.
+    salient: Option<[f64; 3]>,
+    since: u32,
     started: u64,
     refused: u64,
     replaced: u64,
@@ -79,7 +97,9 @@ impl Sources {
             readings: streams.into_iter().map(reading).collect(),
             sources: Vec::with_capacity(SOUNDING),
             sound: Box::new([0.0; PAST + BLOCK_SAMPLES]),
-            present: false,
+            first: None,
+            salient: None,
+            since: 0,
             started: 0,
             refused: 0,
             replaced: 0,
@@ -90,9 +110,9 @@ impl Sources {
         SoundInput::new(Arc::clone(&self.shared))
     }
 
-    /// Whether any sound has been pushed.
-    pub(super) fn is_present(&self) -> bool {
-        self.present
+    /// Whether any sound has begun by `block`.
+    pub(super) fn have_begun(&self, block: u64) -> bool {
+        self.first.is_some_and(|first| first <= block)
     }
 
     /// Takes notice of what was pushed: `block`, which is due, hears that and no more, and what is
@@ -104,20 +124,22 @@ impl Sources {
             let changed = reading.changes != owner.changes();
             // The sound first: who sees it, sees where it is.
             let cut = reading.stream.look();
-            self.present |= reading.stream.is_present();
+            // A slot that changed hands meanwhile is looked at with the next block.
+            let late = slot.owner().changes() != owner.changes();
             if changed {
                 (reading.changes, reading.id, reading.place) = (owner.changes(), owner.id(), None);
             }
-            reading.place = slot.last_place().or(reading.place);
-            let source = self.sources.iter_mut().find(|source| source.slot == Some(i));
-            if let (Some(source), Some(place)) = (source, reading.place) {
-                if changed || cut {
-                    source.slot = None;
-                } else {
-                    source.place = place;
-                }
+            let over = changed || cut || late;
+            reading.dry |= over;
+            let place = if late { None } else { slot.last_place() };
+            reading.place = place.or(reading.place);
+            if let Some(source) = self.sources.iter_mut().find(|source| source.slot == Some(i)) {
+                source.slot = source.slot.filter(|_| !over);
+                source.place = place.filter(|_| !over).unwrap_or(source.place);
             }
-            reading.dry |= changed || cut;
+            if late {
+                continue;
+            }
             if !reading.dry && reading.from < block && reading.stream.ahead() < BLOCK_SAMPLES as u64 {
                 // The last samples are with the resampler, which waits for more.
                 reading.stream.input().finish();
@@ -165,9 +187,13 @@ impl Sources {
                 self.sources.remove(least);
             }
             let (slot, trail) = (Some(slot), Trail::default());
-            self.sources.push(Source { id, slot, place, salience: loud, new: true, trail, rings: false, lost: false });
+            let course = [loud; BLOCK_FRAMES];
+            let source =
+                Source { id, slot, place, salience: loud, course, new: true, trail, rings: false, lost: false };
+            self.sources.push(source);
         }
         self.started += 1;
+        self.first.get_or_insert(block);
         let reading = &mut self.readings[slot];
         (reading.dry, reading.from) = (false, block);
     }
@@ -203,10 +229,11 @@ impl Sources {
                 source.trail.add(&path, sound, [left, right]);
                 let loud = level(&sound[PAST..]) - 20.0 * libm::log10(path.distance);
                 source.salience = loud.max(source.salience - FADE);
+                source.course[t] = source.salience;
             }
             source.trail.past.copy_from_slice(&self.sound[BLOCK_SAMPLES..]);
         }
-        self.forget();
+        self.judge();
     }
 
     /// Lets `block` go by unheard.
@@ -214,11 +241,11 @@ impl Sources {
         for i in 0..self.sources.len() {
             if self.take(i, block).is_some() {
                 let source = &mut self.sources[i];
-                source.salience -= FADE * BLOCK_FRAMES as f64;
+                source.fade();
                 (source.rings, source.lost) = (false, true);
             }
         }
-        self.forget();
+        self.judge();
     }
 
     /// Takes what source `i` gives off in `block` to `sound`; whether it begins with that block,
@@ -241,21 +268,32 @@ impl Sources {
             return Some(false);
         }
         if !source.new {
-            source.salience -= FADE * BLOCK_FRAMES as f64;
+            source.fade();
         }
         None
     }
 
-    /// Forgets sources that are over and do not stand out any more.
-    fn forget(&mut self) {
+    /// Says what stood out in the frames of a block, and forgets sources that are over and do not any
+    /// more.
+    fn judge(&mut self) {
+        for t in 0..BLOCK_FRAMES {
+            let heard = self.sources.iter().filter(|source| !source.new);
+            let most = heard.reduce(|a, b| if b.course[t] > a.course[t] { b } else { a });
+            if let Some(most) = most.filter(|source| source.course[t] >= KNOWN) {
+                (self.salient, self.since) = (Some(most.place), 0);
+            } else {
+                self.since = self.since.saturating_add(1);
+            }
+        }
+        if self.since > HOLD {
+            self.salient = None;
+        }
         self.sources.retain(|source| source.slot.is_some() || source.rings || source.salience >= KNOWN);
     }
 
-    /// Where what stands out most is, if it is known.
+    /// Where what stood out last is, if it is known.
     pub(super) fn salient(&self) -> Option<[f64; 3]> {
-        let heard = self.sources.iter().filter(|source| !source.new);
-        let most = heard.reduce(|a, b| if b.salience > a.salience { b } else { a });
-        most.filter(|source| source.salience >= KNOWN).map(|source| source.place)
+        self.salient
     }
 
     /// No sources, nothing pushed. Waits for pushes that are under way.
@@ -268,7 +306,8 @@ impl Sources {
         }
         self.shared.counts.reset();
         self.sources.clear();
-        (self.present, self.started, self.refused, self.replaced) = (false, 0, 0, 0);
+        (self.first, self.salient, self.since) = (None, None, 0);
+        (self.started, self.refused, self.replaced) = (0, 0, 0);
     }
 
     pub(super) fn stats(&self) -> SoundStats {

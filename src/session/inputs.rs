@@ -187,7 +187,7 @@ impl Listening<'_> {
     fn hears(&self) -> bool {
         match self {
             Self::Voice(block, voice) => voice.voice.is_present() && voice.known(*block).is_some(),
-            Self::Room(_, hearing, _) => hearing.is_present(),
+            Self::Room(block, hearing, _) => hearing.has_begun(*block),
             Self::Nobody => false,
         }
     }
@@ -217,11 +217,13 @@ pub(super) fn listen(exec: &mut Exec, engine: &Engine, inputs: &mut [Listening<'
 }
 
 impl Inputs {
-    pub(super) fn new(engine: &Engine, options: &SessionOptions) -> Result<Self> {
+    pub(super) fn new(exec: &mut Exec, engine: &Engine, options: &SessionOptions) -> Result<Self> {
+        let hearing = engine.config.hearing.as_ref().zip(engine.hearing.as_ref());
+        let hearing = hearing.map(|(config, weights)| Hearing::new(exec, config, weights, engine.config.rig.eyes[1]));
         Ok(Self {
             agent: EncodedVoice::new(engine, options, engine.config.agent_delay_blocks)?,
             user: EncodedVoice::new(engine, options, engine.config.user_delay_blocks)?,
-            hearing: engine.config.hearing.as_ref().map(|h| Hearing::new(h).map(Box::new)).transpose()?,
+            hearing: hearing.transpose()?.map(Box::new),
             head: HeadInput::new(),
             track: HeadTrack::new(),
             user_delay: u64::from(engine.config.user_delay_blocks),
