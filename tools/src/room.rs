@@ -40,7 +40,11 @@ fn dog() -> Vec<f32> {
         let open = 4.0 * part * (1.0 - part);
         // The integral of 380 Hz that rise by 240 towards the middle.
         let turns = 380.0 * since + 240.0 * LONG * part * part * (2.0 - 4.0 / 3.0 * part);
-        open * (wave(turns) + 0.7 * wave(2.0 * turns) + 0.45 * wave(3.0 * turns) + 0.2 * wave(5.0 * turns) + 1.2 * breath)
+        open * (wave(turns)
+            + 0.7 * wave(2.0 * turns)
+            + 0.45 * wave(3.0 * turns)
+            + 0.2 * wave(5.0 * turns)
+            + 1.2 * breath)
     })
 }
 
@@ -48,7 +52,14 @@ fn dog() -> Vec<f32> {
 fn crash() -> Vec<f32> {
     // When each piece lands, and its pitch.
     const PIECES: [(f64, f64); 9] = [
-        (0.0, 1730.0), (0.03, 2390.0), (0.09, 3110.0), (0.16, 1270.0), (0.27, 2770.0), (0.41, 1990.0), (0.58, 3530.0), (0.83, 2210.0),
+        (0.0, 1730.0),
+        (0.03, 2390.0),
+        (0.09, 3110.0),
+        (0.16, 1270.0),
+        (0.27, 2770.0),
+        (0.41, 1990.0),
+        (0.58, 3530.0),
+        (0.83, 2210.0),
         (1.12, 2930.0),
     ];
     let mut noise = Noise(11);
@@ -59,7 +70,8 @@ fn crash() -> Vec<f32> {
         let thud = decay(t, 0.09) * (2.0 * wave(62.0 * t) + 5.0 * low);
         let landed = PIECES.iter().filter(|(start, _)| t >= *start).map(|(start, pitch)| {
             let since = t - start;
-            decay(since, 0.05) * (wave(pitch * since) + 0.5 * wave(1.51 * pitch * since)) * 0.35 + decay(since, 0.012) * hiss * 0.8
+            decay(since, 0.05) * (wave(pitch * since) + 0.5 * wave(1.51 * pitch * since)) * 0.35
+                + decay(since, 0.012) * hiss * 0.8
         });
         thud + landed.sum::<f64>()
     })
@@ -74,12 +86,15 @@ fn music() -> Vec<f32> {
     let pitch = |note: u32| 196.0 * libm::exp2(f64::from(note) / 12.0);
     let pluck = |note: u32, since: f64, half: f64| {
         let turns = pitch(note) * since;
-        (since * 250.0).min(1.0) * decay(since, half) * (wave(turns) + 0.3 * wave(2.0 * turns) + 0.12 * wave(3.0 * turns))
+        (since * 250.0).min(1.0)
+            * decay(since, half)
+            * (wave(turns) + 0.3 * wave(2.0 * turns) + 0.12 * wave(3.0 * turns))
     };
     made(LONG, 0.11, |t| {
         let step = (t / STEP) as usize;
         // Each note goes on into the next.
-        let melody: f64 = (0..3.min(step + 1)).map(|k| pluck(TUNE[(step - k) % 16], t - (step - k) as f64 * STEP, 0.12)).sum();
+        let melody: f64 =
+            (0..3.min(step + 1)).map(|k| pluck(TUNE[(step - k) % 16], t - (step - k) as f64 * STEP, 0.12)).sum();
         let bar = step / 4;
         let bass = pluck(BASS[bar % 4], t - bar as f64 * 4.0 * STEP, 0.5) * 0.5;
         ((LONG - t) / 0.9).min(1.0) * (0.8 * melody + 0.9 * bass)
@@ -125,7 +140,10 @@ mod tests {
             let rms = |part: &[f32]| (part.iter().map(|x| x * x).sum::<f32>() / part.len() as f32).sqrt();
             let loudest = sound.samples.chunks(1200).map(rms).fold(0.0, f32::max);
             assert!((loudest / level - 1.0).abs() < 1e-3, "{}: {loudest}", sound.name);
-            let (end, most) = (rms(&sound.samples[sound.samples.len() - 240..]), sound.samples.iter().fold(0.0_f32, |m, x| m.max(x.abs())));
+            let (end, most) = (
+                rms(&sound.samples[sound.samples.len() - 240..]),
+                sound.samples.iter().fold(0.0_f32, |m, x| m.max(x.abs())),
+            );
             assert!(end < 0.05 * level && most < 20.0, "{}: {end} at its end, {most} at most", sound.name);
         }
         assert!(sounds.windows(2).all(|w| w[0].start + w[0].samples.len() as f64 / RATE < w[1].start));

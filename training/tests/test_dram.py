@@ -1,5 +1,7 @@
 """The featherweight tier: poses, causality, streaming, the step's definition, bundles, training, the corpus' partner."""
 import json
+import os
+import signal
 
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ import torch
 
 from visavis_train import bundle as bundles
 from visavis_train.corpus import partner, store
-from visavis_train.dram import bundle, data, goldens, make_tiny, measure, nets, pose, roll, train
+from visavis_train.dram import agents, alike, bundle, data, goldens, live, make_tiny, measure, nets, pose, roll, train
 from visavis_train.make_tiny import sway
 from visavis_train.motion import features, rig
 
@@ -134,6 +136,7 @@ def fake_arrays(folder, frames=420):
     made = {"y": y.numpy(), "roots": roots.numpy(), "head": head, "forward": np.tile([0, 0, -1.0], (frames, 1)), "turned": zero() + 1, "gaze": zero(),
             "agent": g.standard_normal((frames, 6)), "voice": g.standard_normal((frames, 6)), "has": zero(2) + 1, "speaks": zero(), "hears": zero(), "nods": zero()}
     made["hears"][100:160] = made["speaks"][80:120] = made["nods"][200:230] = True
+    np.save(folder / "hush.npy", np.full(6, 0.25, np.float32))
     for split in ("train", "val"):
         (folder / split).mkdir()
         for name, v in made.items():
@@ -166,6 +169,81 @@ def test_training_runs_and_improves(kind, layout, tmp_path, monkeypatch):
     if used.root:
         y, _, roots = roll.free(net, w, used, 96, 396)
         assert all(np.isfinite(v) for k, v in measure.liveliness(y, roots, w, 96).items() if k != "wrist talking")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_agents_live_on_in_their_own_motion(kind, tmp_path):
+    fake_arrays(tmp_path)
+    net, split = small(kind), data.Split(str(tmp_path), "train")
+    for name, value in zip(("mean", "std", "step"), split.statistics(pose.Layout())):
+        getattr(net, name).copy_(value)
+    torch.manual_seed(5)
+    pool = agents.Agents(net, split, 6, 8, short=10 ** 9)
+    pool.at[:] = split.starts[0] + 1 + agents.REACH
+    pool._begin(net, torch.arange(6))
+    pool.at[:] = split.starts[0] + 1 + agents.REACH + 5
+    first, roots, w = pool.stretch(net)
+    assert first.shape == (6, agents.PAST + 8, 136) and first[:, agents.PAST:].requires_grad and torch.equal(w.y[0, 0], split.y[int(pool.at[0]) - 8 - agents.PAST])
+    second, after, _ = pool.stretch(net)
+    assert torch.equal(second[:, agents.PAST - 8:agents.PAST], first[:, agents.PAST:].detach())
+    walked = roots[:, -1].detach()
+    for t in range(agents.PAST, agents.PAST + 8):
+        walked = roll.advance(walked, second[:, t].detach())
+    assert (walked - after[:, -1].detach()).abs().max() < 1e-5
+    pool.hushed[1] = pool.fixed[2] = True
+    given = pool._window(torch.arange(6), pool.at, 4)
+    assert (given.agent[1] == 0.25).all() and (given.voice[1] == 0.25).all() and not (given.agent[2] == 0.25).any()
+    assert (given.head[2] == pool.seat[2]).all() and torch.equal(given.head[1], split.head[int(pool.at[1]):int(pool.at[1]) + 4])
+    kept = agents.Agents(net, split, 6, 8, short=10 ** 9)
+    kept.load_state_dict(pool.state_dict())
+    torch.manual_seed(1)
+    a = pool.stretch(net)[0]
+    torch.manual_seed(1)
+    assert torch.equal(a, kept.stretch(net)[0])
+    pool.at[:] = split.starts[1] - 3
+    third, moved, w = pool.stretch(net)   # at the clip's end: elsewhere, beside the recorded agent
+    assert (moved[:, agents.PAST - 1, :2] - w.roots[:, agents.PAST - 1, :2]).norm(dim=-1).max() < 0.6 and torch.isfinite(third).all()
+
+
+def test_losses_tell_motion_that_differs(tmp_path):
+    fake_arrays(tmp_path)
+    split = data.Split(str(tmp_path), "train")
+    w = split.at([0] * 12, [40 + 20 * i for i in range(12)], agents.PAST + 32)
+    real = alike.Body(w.y, w.roots, w.head)
+    truth = np.stack([rig.gaze_score(p, r, u) for p, r, u in zip(*measure.body(w.y, w.roots), w.head.numpy())])
+    assert (real.score - torch.from_numpy(truth)).abs().max() < 1e-4
+    kinds = alike.doing(w)
+    assert kinds.shape == (12, 4, 4) and (kinds.sum(-1) == 1).all()
+    still = alike.Body(w.y[:, :1].expand_as(w.y), w.roots[:, :1].expand_as(w.roots))
+    std = torch.full((rig.J, 3), 0.1)
+    assert alike.alike(real, real, kinds) == 0 and alike.poses(real, real, std) == 0
+    assert alike.alike(still, real, kinds) > 0.1 and alike.poses(still, real, std) > 0
+    slid = w.roots.clone()
+    slid[..., 0] += torch.arange(agents.PAST + 32) * 0.02
+    assert alike.feet(alike.Body(still.y, slid)) > alike.feet(still) + 0.3
+    score, told = torch.full((2, 8), 0.5), torch.ones(2, 2)
+    loss = lambda wanted: alike.own_scores(score, torch.full((2,), 0.5), torch.full((2,), wanted), told, torch.ones(2, dtype=torch.bool), score)[0]
+    assert loss(0.5) == 0 < loss(0.2) < loss(-0.2)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_training_in_own_motion_goes_on_where_it_was(kind, tmp_path, monkeypatch):
+    fake_arrays(tmp_path)
+    monkeypatch.setitem(train.SIZES, kind, make_tiny.SIZES[kind])
+    monkeypatch.setattr(live, "judged", lambda net, data: {})
+    base = ["--data", str(tmp_path), "--device", "cpu", "--batch", "4"]
+    call = lambda module, *more: (monkeypatch.setattr("sys.argv", [module.__name__, *base, *more]), module.main())
+    call(train, "--out", str(tmp_path / "n.pt"), "--backbone", kind, "--steps", "3", "--own", "2")
+    own = ["--init", str(tmp_path / "n.pt"), "--agents", "8", "--frames", "8", "--steps", "6"]
+    call(live, "--out", str(tmp_path / "a.pt"), *own)
+    stopping = live.Live.__call__
+    monkeypatch.setattr(live.Live, "__call__", lambda self, step, batch: (stopping(self, step, batch), os.kill(os.getpid(), signal.SIGTERM) if step == 2 else None)[0])
+    with pytest.raises(SystemExit):
+        call(live, "--out", str(tmp_path / "b.pt"), *own)
+    monkeypatch.setattr(live.Live, "__call__", stopping)
+    call(live, "--out", str(tmp_path / "b.pt"), *own, "--resume")
+    a, b, start = (train.load(str(tmp_path / f"{n}.pt"))[0].state_dict() for n in "abn")
+    assert all(torch.equal(a[k], b[k]) for k in a) and any(not torch.equal(a[k], start[k]) for k in a)
 
 
 def test_noise_is_slow_and_forecasts_are_free_of_its_size():

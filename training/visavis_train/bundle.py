@@ -71,6 +71,7 @@ class Bundle:
     vae: Vae
     flow: FlowNet
     student: FlowNet | None
+    hearing: AudioEncoder | None   # what is heard in the room
 
     def stat(self, name):
         return self.tensors[f"stats.{name}"].float()
@@ -101,9 +102,22 @@ class Bundle:
         return self.tensors["idle.frames"].float()
 
 
-def flow_from(config, latent, audio_features):
+def flow_from(config, latent, audio_features, hearing=None):
+    """The network of a `flow` section; `hearing`: that section of the bundle, if it has one."""
     keys = ("layers", "width", "heads", "mlp", "tau_width", "window_blocks", "embed_latent", "embed_user", "embed_voice", "embed_gaze", "user_scale")
-    return FlowNet(latent, audio_features, **{k: config[k] for k in keys})
+    sound = {"sound_features": hearing["audio"]["features"], "embed_sound": hearing["embed"]} if hearing else {}
+    return FlowNet(latent, audio_features, **{k: config[k] for k in keys}, **sound)
+
+
+def encoder_from(config):
+    """The network of an `audio` section."""
+    layers = [tuple(c[k] for k in ("inputs", "outputs", "kernel", "stride", "residual")) for c in config["layers"]]
+    return AudioEncoder(layers, config["features"])
+
+
+def audio_config(spec, features):
+    """An `audio` section."""
+    return {"layers": [dict(zip(("inputs", "outputs", "kernel", "stride", "residual"), s)) for s in spec], "features": features}
 
 
 def vae_from(config, features):
@@ -118,25 +132,27 @@ def read(path):
     if config["format"] != FORMAT:
         raise ValueError(f"{path} has format {config['format']}, this code reads {FORMAT}")
     features = 3 + 36 * len(config["rig"]["joints"])
-    layers = [tuple(c[k] for k in ("inputs", "outputs", "kernel", "stride", "residual")) for c in config["audio"]["layers"]]
-    audio_features, latent = config["audio"]["features"], config["vae"]["latent"]
+    hearing = config.get("hearing")
+    net = lambda: flow_from(config["flow"], config["vae"]["latent"], config["audio"]["features"], hearing)
     return Bundle(
         config, tensors,
-        load_net("audio", AudioEncoder(layers, audio_features), tensors),
+        load_net("audio", encoder_from(config["audio"]), tensors),
         load_net("vae", vae_from(config["vae"], features), tensors),
-        load_net("flow", flow_from(config["flow"], latent, audio_features), tensors),
-        load_net("student", flow_from(config["flow"], latent, audio_features), tensors) if config.get("student") else None)
+        load_net("flow", net(), tensors),
+        load_net("student", net(), tensors) if config.get("student") else None,
+        load_net("hearing", encoder_from(hearing["audio"]), tensors) if hearing else None)
 
 
-def make_config(rig, audio_layers, audio_features, vae, flow, *, name, description, licence, student=None, radius=0.1, session=None):
-    """The configuration in the shape of src/config.rs. `vae` and `flow` are dicts of their fields, `session` of those that differ from `SESSION`."""
+def make_config(rig, audio_layers, audio_features, vae, flow, *, name, description, licence, student=None, radius=0.1, session=None, hearing=None):
+    """The configuration in the shape of src/config.rs. `vae` and `flow` are dicts of their fields, `session` of those that differ from `SESSION`;
+    `hearing` the section of bundles that hear the room."""
     return {
         "format": FORMAT, "name": name, "description": description, "licence": licence,
         "user_delay_blocks": 1, "agent_delay_blocks": 0, "rig": rig, "pose": {"radius": radius},
-        "audio": {"layers": [dict(zip(("inputs", "outputs", "kernel", "stride", "residual"), s)) for s in audio_layers], "features": audio_features},
+        "audio": audio_config(audio_layers, audio_features),
         "vae": vae, "flow": flow, "student": student,
         "session": SESSION | (session or {}),
-    }
+    } | ({"hearing": hearing} if hearing else {})
 
 
 def rig_config(names, parents, offsets, eyes, head_back):

@@ -2,7 +2,7 @@
 
     python -m visavis_train.checkpoints --bundle B.safetensors --out runs/start
 
-Writes OUT/{audio,vae,flow,student}.pt (the last one if the bundle has a student), for `--init` of the trainers. Optimiser states are not
+Writes OUT/{audio,vae,flow,student,hearing}.pt (the last two if the bundle has a student, hears the room), for `--init` of the trainers. Optimiser states are not
 in a bundle, so schedules start anew.
 """
 import argparse
@@ -18,9 +18,13 @@ def split(b):
     latents = {"latent_mean": b.stat("latent_mean"), "latent_std": b.stat("latent_std")}
     flow = {"size": {k: v for k, v in b.config["flow"].items()}, "latent": b.config["vae"]["latent"], "audio": width}
     both = lambda net: {"net": net.state_dict(), "ema": net.state_dict()}
+    if b.hearing is not None:
+        flow["sound"] = b.config["hearing"]["audio"]["features"]
     out = {"audio": both(b.audio) | {"spec": b.audio.spec, "features": width},
            "vae": both(b.vae) | {"size": dict(b.config["vae"]), "mean": b.stat("pose_mean"), "std": b.stat("pose_std")},
            "flow": both(b.flow) | flow | latents}
+    if b.hearing is not None:
+        out["hearing"] = both(b.hearing) | {"spec": b.hearing.spec, "features": flow["sound"]}
     if b.student is not None:
         out["student"] = both(b.student) | flow | latents | b.config["student"]
     return out

@@ -51,8 +51,8 @@ def idle_clip(corpus, split, n, limit=80, known=None):
     return best[1], best[2]
 
 
-def assemble(audio, vae_path, flow_path, student_path, idle, name, licence, session=None):
-    """Tensors and configuration of a bundle."""
+def assemble(audio, vae_path, flow_path, student_path, idle, name, licence, session=None, hearing=None):
+    """Tensors and configuration of a bundle. `hearing`: the encoder of what is heard in the room, of networks that hear it."""
     vae, mean, std, vae_state = load_vae(vae_path)
     flow, state = load_flow(flow_path)
     tensors = {"stats.pose_mean": mean, "stats.pose_std": std, "stats.latent_mean": state["latent_mean"], "stats.latent_std": state["latent_std"],
@@ -63,11 +63,15 @@ def assemble(audio, vae_path, flow_path, student_path, idle, name, licence, sess
         net, s = load_flow(student_path)
         nets.append(("student", net))
         student = {k: s[k] for k in ("tau_history", "guidance", "gaze_guidance")}
+    room = None
+    if hearing is not None:
+        nets.append(("hearing", hearing))
+        room = {"audio": bundle.audio_config(hearing.spec, hearing.out.out_features), "embed": flow.embed_sound["2"].out_features}
     for prefix, net in nets:
         tensors |= bundle.net_tensors(prefix, net)
     rig_json = bundle.rig_config(rig.NAMES, rig.PARENTS, rig.OFFSETS, rig.EYES, rig.HEAD_BACK)
     config = bundle.make_config(rig_json, audio.spec, audio.out.out_features, vae_state["size"], state["size"], name=name,
-                                description=DESCRIPTION, licence=licence, student=student, session=session)
+                                description=DESCRIPTION, licence=licence, student=student, session=session, hearing=room)
     return tensors, config
 
 
@@ -76,6 +80,9 @@ def main():
     for name in ("corpus", "audio", "vae", "flow", "out"):
         parser.add_argument(f"--{name}", required=True)
     parser.add_argument("--student")
+    parser.add_argument("--hearing", help="encoder of what is heard in the room (`hearing.encoder`), of a flow that was trained with it")
+    parser.add_argument("--data", help="folder whose sounds/esc10/ATTRIBUTION.tsv names the makers of sounds, where a corpus has such")
+    parser.add_argument("--sources", nargs="*", default=[], metavar="CORPUS", help="further corpora whose recordings are to be acknowledged")
     parser.add_argument("--name", default="base")
     parser.add_argument("--idle-frames", type=int, default=64)
     parser.add_argument("--idle-from", help="take the idle clip of this bundle")
@@ -92,8 +99,10 @@ def main():
         if idle is None:
             raise SystemExit(f"no clips of conversations or people at rest under {args.corpus}/train")
         print(f"idle clip from {where}")
-    tensors, config = assemble(load_audio(args.audio), args.vae, args.flow, args.student, idle, args.name, credits.licence(args.corpus),
-                               {k: v for k in ("guidance", "gaze_guidance", "temperature") if (v := getattr(args, k)) is not None})
+    tensors, config = assemble(load_audio(args.audio), args.vae, args.flow, args.student, idle, args.name,
+                               credits.licence(args.corpus, *args.sources, data=args.data),
+                               {k: v for k in ("guidance", "gaze_guidance", "temperature") if (v := getattr(args, k)) is not None},
+                               load_audio(args.hearing) if args.hearing else None)
     bundle.write(args.out, tensors, config, half=args.half, narrow=NARROW)
     print(f"{args.out}: {os.path.getsize(args.out) / 1e6:.1f} MB")
 

@@ -17,6 +17,10 @@ Contents (K blocks, T = 4 K frames):
     latents.midpoint2, latents.midpoint1, latents.clean (midpoint 4, history at least at 0.9 from 0.3 on) [K, Dz], with their own history and user in their own agent frame
     student [K, Dz], student.user [K, 8]: history tau_h z + (1 - tau_h) eps at tau_h = tau_history, new token eps at 0
     encoder.frames [16, F] metres, encoder.mu, encoder.logvar [4, Dz]
+A bundle that hears the room has three sounds in it, pushed whole at the starts of their blocks, and sensitivity 0.5:
+    sounds.{i} [N] pascals at 24 kHz, sounds.places [3, 3], sounds.blocks [3];  and of the main run (midpoint 4)
+    hearing.ears [24, 2, 800] of frames 8 to 31, hearing.levels [T, 2], hearing.place [T, 3], hearing.known [T], hearing.features [T, D_s],
+    conditioning.sound [K, S], conditioning.heard [K]; with the heads hearing.middle, hearing.left [T, 3] of the frames as decoded
 """
 import argparse
 
@@ -25,12 +29,13 @@ import torch
 from safetensors.torch import save_file
 
 from . import bundle as bundles
-from .motion import features as feat
-from .nets.flow import Condition, absent, cat_conditions
+from .hearing import ears
+from .motion import features as feat, rig
+from .nets.flow import Condition, absent, sound_width
 from .nets.stream import Reference, branches
 from .train.geometry import integrate, to_local
 
-GAZE_TARGET = 0.8
+GAZE_TARGET, SENSITIVITY = 0.8, 0.5
 
 
 def voices(samples, seed):
@@ -54,12 +59,14 @@ def listen(audio, voice, frames):
 class Session:
     """Runs a session of the bundle over given inputs with one of its samplers."""
 
-    def __init__(self, b, agent, voice, path, eps, eps_idle, steps=4, student=False, clean=None):
+    def __init__(self, b, agent, voice, path, eps, eps_idle, steps=4, student=False, clean=None, sounds=()):
         m = len(b.idle()) // 4
         net, settings = (b.student, b.config["student"]) if student else (b.flow, b.config["session"])
         reference = Reference(net, settings["guidance"], settings["gaze_guidance"], clean)
         self.idle = b.encode(b.idle()[None])
-        none = absent(1, m, b.config["audio"]["features"])
+        self.b, self.sounds, self.sound, self.heard = b, sounds, [], []
+        self.width = b.config["hearing"]["audio"]["features"] if b.hearing else 0
+        none = absent(1, m, b.config["audio"]["features"], sound_features=self.width)
         reference.push(self.idle, eps_idle[None], branches(none, True))
         root = torch.zeros(1, 3, dtype=torch.float64)
         z, self.user, self.flags, self.x1, self.roots = [self.idle], [], [], [], []
@@ -68,7 +75,8 @@ class Session:
             user = to_local(root, path[None, block.start - 4:block.start, [0, 2]].double()).float().reshape(1, 1, 8) if k else torch.zeros(1, 1, 8)
             heard = voice[block.start - 4:block.start].reshape(1, 1, -1) if k else torch.zeros(1, 1, 4 * voice.shape[1])
             flags = torch.tensor([[[float(k > 0), 1.0, float(k > 0), 1.0]]])
-            cond = branches(Condition(user, agent[block].reshape(1, 1, -1), heard, torch.full((1, 1, 4), GAZE_TARGET), flags), True)
+            sound = self.room(k, decoded if k else None, root) if self.width else ()
+            cond = branches(Condition(user, agent[block].reshape(1, 1, -1), heard, torch.full((1, 1, 4), GAZE_TARGET), flags, *sound), True)
             e = eps[None, k:k + 1]
             if student:
                 new = reference.single(e, cond, settings["tau_history"])
@@ -86,6 +94,27 @@ class Session:
         self.z, self.decoded = torch.cat(z[1:], 1)[0], decoded
         self.user, self.flags, self.roots = torch.stack(self.user), torch.stack(self.flags), torch.cat(self.roots)
 
+    def room(self, k, decoded, root):
+        """Sound vector [1, 1, S] of block k, from what was heard through the block before, and its flag [1, 1, 1]."""
+        first = min(s.first for s in self.sounds)
+        if 4 * k <= first:
+            sound, flag = torch.zeros(1, 1, sound_width(self.width)), torch.zeros(1, 1, 1)
+        else:
+            x = self.b.unstandardise(decoded).numpy()
+            positions, quats = feat.from_features(np.concatenate([x[:1], x]))
+            self.middle, self.left = ears.centre(positions[1:], rig.quat_to_mat(quats[1:]))
+            self.ears = ears.hear([s for s in self.sounds if s.first < 4 * k], self.middle, self.left)
+            features = torch.zeros(4 * k, self.width)
+            features[first:] = ears.listen(self.b.hearing, ears.squashed(self.ears.ears)[800 * first:])
+            self.features = features
+            last, f32 = slice(4 * k - 4, 4 * k), lambda a: torch.tensor(a, dtype=torch.float32)
+            sound = ears.vector(features[None, last], f32(self.ears.levels[None, last]), f32(self.ears.place[None, 4 * k - 1]),
+                                f32(self.ears.known[None, 4 * k - 1]), root, torch.tensor([SENSITIVITY]))[None]
+            flag = torch.ones(1, 1, 1)
+        self.sound.append(sound[0, 0])
+        self.heard.append(flag[0, 0, 0])
+        return sound, flag
+
 
 @torch.no_grad()
 def compute(b, blocks=20, seed=7):
@@ -96,7 +125,8 @@ def compute(b, blocks=20, seed=7):
     path = torch.stack([1.2 * torch.sin(0.8 * t), 1.6 + 0 * t, 1.5 + 0.4 * torch.cos(1.1 * t)], -1)
     eps, eps_idle = torch.randn(blocks, latent), torch.randn(m, latent)
     agent, voice = listen(b.audio, agent_voice, frames), listen(b.audio, user_voice, frames)
-    run = lambda **kw: Session(b, agent, voice, path, eps, eps_idle, **kw)
+    sounds = room_sounds() if b.hearing else ()
+    run = lambda **kw: Session(b, agent, voice, path, eps, eps_idle, sounds=sounds, **kw)
     main = run()
     mu, _ = b.vae.encoder(b.standardise(b.idle()[None]))
     some = torch.tensor([*range(4), *range(frames // 2, frames // 2 + 4), *range(frames - 8, frames)])
@@ -117,7 +147,30 @@ def compute(b, blocks=20, seed=7):
     if b.student is not None:
         s = run(student=True)
         out |= {"student": s.z, "student.user": s.user}
-    return out
+    return out | heard_by(main, sounds)
+
+
+def room_sounds():
+    """A burst close by, a buzz on the other side at the same time, and a quiet tone later."""
+    r, t = np.random.default_rng(3), np.arange(9000) / 24000
+    burst = r.standard_normal(5000) * np.exp(-np.arange(5000) / 900)
+    buzz = 0.5 * np.sign(np.sin(2 * np.pi * 180 * t))
+    tone = 0.02 * np.sin(2 * np.pi * 700 * t[:6000])
+    at = lambda block, wave, *place: ears.Source(4 * block, wave.astype(np.float32), np.array(place))
+    return [at(2, burst, 1.2, 1.5, -1.0), at(3, buzz, -2.5, 0.4, 2.0), at(15, tone, 0.3, 1.7, 4.0)]
+
+
+def heard_by(session, sounds):
+    """What the main run heard of `sounds`; nothing of a bundle without hearing."""
+    if not sounds:
+        return {}
+    f32 = lambda a: torch.tensor(np.ascontiguousarray(a), dtype=torch.float32)
+    h = session.ears
+    out = {f"sounds.{i}": f32(s.wave) for i, s in enumerate(sounds)}
+    return out | {"sounds.places": f32(np.stack([s.place for s in sounds])), "sounds.blocks": torch.tensor([s.first // 4 for s in sounds]).int(),
+                  "hearing.ears": f32(h.ears.reshape(2, -1, 800).transpose(1, 0, 2)[8:32]), "hearing.levels": f32(h.levels), "hearing.place": f32(h.place),
+                  "hearing.known": f32(h.known), "hearing.features": session.features, "hearing.middle": f32(session.middle),
+                  "hearing.left": f32(session.left), "conditioning.sound": torch.stack(session.sound), "conditioning.heard": torch.stack(session.heard)}
 
 
 def main():

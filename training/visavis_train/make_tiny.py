@@ -1,6 +1,7 @@
 """Makes the tiny bundle that parity tests run on: random weights, real shapes. Deterministic for a seed.
 
     python -m visavis_train.make_tiny --out tests/goldens/tiny.safetensors
+    python -m visavis_train.make_tiny --hearing --out tests/goldens/hearing.safetensors      one that hears the room
 """
 import argparse
 
@@ -45,7 +46,7 @@ def lively(net, scale=1.0):
     return net.eval()
 
 
-def build(seed=1):
+def build(seed=1, hearing=False):
     torch.manual_seed(seed)
     x = sway(400)
     mean = x.mean(0)
@@ -62,10 +63,19 @@ def build(seed=1):
                "stats.latent_mean": 0.1 * torch.randn(latent), "stats.latent_std": 0.5 + torch.rand(latent)}
     for prefix, net in (("audio", audio), ("vae", vae), ("flow", flow), ("student", student)):
         tensors |= bundle.net_tensors(prefix, net)
+    heard = {}
+    if hearing:
+        room = {"audio": bundle.audio_config(AUDIO, 6), "embed": 8}
+        hearing = lively(AudioEncoder(AUDIO, 6), 1.6)
+        tensors |= bundle.net_tensors("hearing", hearing)
+        for prefix, net in (("flow", flow), ("student", student)):
+            full = lively(bundle.flow_from(FLOW, latent, 8, room))
+            tensors |= {k: v for k, v in bundle.net_tensors(prefix, full).items() if "_sound" in k}
+        heard = {"hearing": room}
     config = bundle.make_config(
         bundle.rig_config(rig.NAMES, rig.PARENTS, rig.OFFSETS, rig.EYES, rig.HEAD_BACK), AUDIO, 8, VAE, FLOW, name="tiny",
         description="Random weights for tests; its motion means nothing.", licence="Same as the code.",
-        student={"tau_history": 0.9375, "guidance": 1.3, "gaze_guidance": 2.5})
+        student={"tau_history": 0.9375, "guidance": 1.3, "gaze_guidance": 2.5}, **heard)
     config["session"] = {"guidance": 1.3, "gaze_guidance": 2.5, "anchor_period": 0, "anchor_radius": 1000.0}
     return tensors, config
 
@@ -74,8 +84,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--out", required=True)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--hearing", action="store_true", help="networks hear the room")
     args = parser.parse_args()
-    tensors, config = build(args.seed)
+    tensors, config = build(args.seed, args.hearing)
     bundle.write(args.out, tensors, config, half=True)
 
 

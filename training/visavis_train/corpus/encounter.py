@@ -92,12 +92,13 @@ def _segment(rng, kind, user, agent, height, real_paths):
 _KINDS = ["stand", "approach", "leave", "pace", "walk", "circle", "crouch", "jump", "real"]
 
 
-def simulate(rng, frames, bias, mobility, real_paths=(), restless=(6, 20)):
+def simulate(rng, frames, bias, mobility, real_paths=(), restless=(6, 20), urge=None):
     """Runs user and agent together.
 
     `bias` [T]: wanted body heading away from the user's direction [rad]; `mobility` -0.15..1: how much the user moves about;
     `real_paths`: head paths [n, 3] of real people of the same split; `restless`: seconds from one step of its own accord
-    to the next. Returns an Encounter.
+    to the next; `urge(t, root, yaw)`: what draws the agent away from the user, as (floor place or None, heading or None,
+    greatest speed), or None. Returns an Encounter.
     """
     dt = 1.0 / FPS
     weights = np.array([1.0, 0.7, 0.9, 0.7, 0.5, 0.6, 0.25, 0.4, 0.35])
@@ -150,7 +151,14 @@ def simulate(rng, frames, bias, mobility, real_paths=(), restless=(6, 20)):
             if moving and far < 0.08 and np.hypot(*v) < 0.15:
                 moving = False
                 slack = rng.uniform(0.3, 0.55)
-            if moving:
+            drawn = urge(t, p, yaw) if urge else None
+            if drawn and drawn[0] is not None:
+                err = drawn[0] - p
+                far = np.hypot(*err)
+                ahead = np.cos(np.arctan2(err[0], err[1]) - yaw)
+                want = err / max(far, 1e-6) * min(drawn[2] * (1.0 if ahead > 0.5 else 0.6), 1.6 * far)
+                moving = False
+            elif moving:
                 ahead = np.cos(np.arctan2(err[0], err[1]) - yaw)
                 top = brisk * (1.0 if ahead > 0.5 else 0.55)
                 if ahead < 0.2 and far > 1.0:
@@ -167,14 +175,17 @@ def simulate(rng, frames, bias, mobility, real_paths=(), restless=(6, 20)):
             p = p + v * dt
             face = np.arctan2(d[0], d[1])
             goal = face + (bias[t] + shift_yaw) * (0.3 if moving and far > 0.8 else 1.0)
+            if drawn and drawn[1] is not None:
+                goal, turning = drawn[1], True
             e = wrap(goal - yaw)
             if not turning and (abs(e) > threshold or (moving and abs(e) > 0.12)):
                 turning = True
             if turning and abs(e) < 0.06 and abs(w) < 0.15 and not moving:
                 turning = False
                 threshold = rng.uniform(0.22, 0.6)
-            acc = 3.6 ** 2 * e - 2 * 3.6 * w if turning else -5.0 * w
-            w = np.clip(w + np.clip(acc, -14, 14) * dt, -2.6, 2.6)
+            stiff, most = (4.2, 3.4) if drawn else (3.6, 2.6)
+            acc = stiff ** 2 * e - 2 * stiff * w if turning else -5.0 * w
+            w = np.clip(w + np.clip(acc, -20 if drawn else -14, 20 if drawn else 14) * dt, -most, most)
             yaw = yaw + w * dt
             P.append(p.copy()), Y.append(yaw), V.append(np.hypot(*v))
     user3 = np.stack([np.array(U)[:, 0], np.array(H), np.array(U)[:, 1]], 1)

@@ -2,7 +2,7 @@
 
     python -m visavis_train.dram.data --corpus DIR --audio runs/audio.pt --out WORK/dram [--every 2]
 
-Writes OUT/{train,val,test}/*.npy. Conversations of a corpus without the user's head rotations get them as `corpus/partner.py` derives them.
+Writes OUT/{train,val,test}/*.npy and OUT/hush.npy, the features of a voice of zeros. Conversations of a corpus without the user's head rotations get them as `corpus/partner.py` derives them.
 """
 import argparse
 import functools
@@ -80,6 +80,7 @@ class Split:
             setattr(self, name, torch.from_numpy(np.load(os.path.join(place, name + ".npy"), mmap_mode="c")))
         with open(os.path.join(place, "names.json")) as f:
             self.names = json.load(f)
+        self.hush = torch.from_numpy(np.load(os.path.join(folder, "hush.npy")))
         self.talk = torch.tensor([n.startswith("talk") for n in self.names])
 
     @functools.cached_property
@@ -134,6 +135,8 @@ def main():
     args = parser.parse_args()
     torch.set_num_threads(1)
     audio = cache.load_audio(args.audio)
+    os.makedirs(args.out, exist_ok=True)
+    np.save(os.path.join(args.out, "hush.npy"), cache.listen(audio, np.zeros(800 * 60, np.int16), 60)[-1].float().numpy())
     for split in args.splits.split(","):
         paths = store.list_clips(args.corpus, split)[::args.every if split == "train" else 1]
         place, made, starts = os.path.join(args.out, split), {name: [] for name in ARRAYS}, [0]

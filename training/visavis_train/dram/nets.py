@@ -53,17 +53,18 @@ class Tcn(nn.Module):
         return sum(self.dilations) + 1
 
     def state(self, batch):
-        """The last `dilation` inputs of each layer, zeros."""
-        return [torch.zeros(batch, d, self.into.out_features, device=self.out.weight.device) for d in self.dilations]
+        """The last `dilation` inputs of each layer [B, width], the oldest first: zeros. Apart, so that a frame neither copies nor, backwards, fills them all."""
+        zero = torch.zeros(batch, self.into.out_features, device=self.out.weight.device)
+        return [(zero,) * d for d in self.dilations]
 
     def forward(self, x, state):
         """x [B, T, inputs] -> [B, T, outputs] and the state after it."""
-        h, after = self.into(x), []
+        h, after, frames = self.into(x), [], x.shape[1]
         for conv, fc, past, d in zip(self.conv, self.fc, state, self.dilations):
-            every = torch.cat([past, h], 1)
-            after.append(every[:, -d:])
+            after.append((past + h.unbind(1))[-d:])
+            early = torch.stack(past[:frames], 1)
             weight = conv.weight.permute(0, 2, 1).flatten(1)
-            pair = torch.cat([every[:, :h.shape[1]], h], -1)
+            pair = torch.cat([early if frames <= d else torch.cat([early, h[:, :frames - d]], 1), h], -1)
             h = h + fc(gelu(F.linear(pair, weight, conv.bias)))
         return self.out(h), after
 

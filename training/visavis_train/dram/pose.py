@@ -61,7 +61,8 @@ def orthonormal(six):
 def matrices(six):
     """Orthonormal columns [..., 6] -> rotation matrices [..., 3, 3]."""
     a, b = six[..., :3], six[..., 3:]
-    return torch.stack([a, b, torch.linalg.cross(a, b, dim=-1)], -1)
+    (ax, ay, az), (bx, by, bz) = a.unbind(-1), b.unbind(-1)
+    return torch.stack([a, b, torch.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], -1)], -1)
 
 
 def from_world(positions, rotations):
@@ -80,13 +81,13 @@ def from_world(positions, rotations):
 
 def kinematics(six, height=None):
     """Joint positions [..., J, 3] and rotations [..., J, 3, 3] in the heading frame, from columns [..., J, 6] and the hips' height [...]."""
-    local = matrices(six)
-    zero = torch.zeros_like(local[..., 0, :, 0])
+    local = matrices(six).unbind(-3)   # apart: a joint's gradient need not fill all joints
+    zero = torch.zeros_like(local[0][..., 0])
     at = zero if height is None else torch.stack([torch.zeros_like(height), height, torch.zeros_like(height)], -1)
-    places, turns = [at], [local[..., 0, :, :]]
+    places, turns = [at], [local[0]]
     offsets = OFFSETS.to(six)
     for j in range(1, rig.J):
         p = rig.PARENTS[j]
         places.append(places[p] + turns[p] @ offsets[j])
-        turns.append(turns[p] @ local[..., j, :, :])
+        turns.append(turns[p] @ local[j])
     return torch.stack(places, -2), torch.stack(turns, -3)

@@ -23,6 +23,13 @@ def proper(net, layout, p):
     return standardise(net, y), y
 
 
+def each(change, state, *others):
+    """A state whose tensors are changed, those of `others` at the same places given too."""
+    if torch.is_tensor(state):
+        return change(state, *others)
+    return type(state)(each(change, *parts) for parts in zip(state, *others))
+
+
 class Run:
     """A model that goes on from standardised poses `p` and, before it, `before` [B, D]; roots [B, 3] at p."""
 

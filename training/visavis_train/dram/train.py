@@ -56,7 +56,7 @@ def losses(net, window, layout, own, most=0.5):
     off = noise(clean, net.step, most)
     history = clean + off
     out, _, state = roll.forced(net, window, layout, WARM, FIRST, history)
-    out, state = out.float(), [[h.float() for h in part] for part in state]
+    out, state = out.float(), roll.each(torch.Tensor.float, state)
     wanted = clean[:, WARM:FIRST] + (0 if net.absolute else KEPT * off[:, WARM - 1:FIRST - 1])
     near = ((out - wanted) / net.step)[:, 16:].clamp(-30, 30).square().mean()
     if not own or net.absolute:

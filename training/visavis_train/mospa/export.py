@@ -5,7 +5,6 @@
 The licence names whose recordings the clips of `train` were made from; each of ESC-10's by its maker, from DATA/sounds/esc10/ATTRIBUTION.tsv.
 """
 import argparse
-import csv
 import json
 import os
 
@@ -21,15 +20,7 @@ def licence(corpus, data):
     """Acknowledgements of what the clips name."""
     with open(os.path.join(corpus, "train", "clips.json")) as f:
         clips = json.load(f)
-    names = {n for c in clips for n in c["motion"]} | {c["sound"] for c in clips}
-    texts = [text for prefix, text in credits.SOURCES.items() if any(n.startswith(prefix) for n in names) or prefix in credits.ALWAYS]
-    with open(os.path.join(data, "sounds", "esc10", "ATTRIBUTION.tsv"), encoding="utf-8") as f:
-        rows = [r for r in csv.DictReader(f, delimiter="\t") if any(n.endswith("/" + r["file"]) for n in names)]
-    makers = sorted({r["by"] for r in rows if r["licence"] != "CC0"})
-    texts.append("Sounds: ESC-10 (K. J. Piczak, ESC: Dataset for Environmental Sound Classification, 2015), clips of Freesound under CC0 and, cut and rendered, under CC BY 3.0 by "
-                 + ", ".join(makers) + ".")
-    texts.append("Music: own tunes, played with the FluidR3 soundfont, MIT, Copyright (c) 2000-2002, 2008 Frank Wen.")
-    return "Weights made from public material. " + " ".join(texts)
+    return credits.statement({n for c in clips for n in c["motion"]} | {c["sound"] for c in clips} | {"music/"}, data)
 
 
 def main():

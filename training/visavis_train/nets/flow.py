@@ -1,6 +1,6 @@
 """Flow-matching transformer over latents, x1-prediction, SARAH 3.3 (mirrors src/flow)."""
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import torch
 from torch import nn
@@ -14,35 +14,49 @@ USER, AGENT, VOICE, GAZE = range(4)  # order of the presence flags
 @dataclass
 class Condition:
     """Conditioning of K tokens: user [B, K, 8] metres in the agent's frame, agent and voice [B, K, 4 D_a] features
-    (the agent's voice and the user's), gaze [B, K, 4], flags [B, K, 4] of presence."""
+    (the agent's voice and the user's), gaze [B, K, 4], flags [B, K, 4] of presence. For networks that hear the room, sound
+    [B, K, S] (`sound_width`) and heard [B, K, 1], its flag; else None."""
     user: torch.Tensor
     agent: torch.Tensor
     voice: torch.Tensor
     gaze: torch.Tensor
     flags: torch.Tensor
+    sound: torch.Tensor = None
+    heard: torch.Tensor = None
 
     def map(self, f):
-        return Condition(f(self.user), f(self.agent), f(self.voice), f(self.gaze), f(self.flags))
+        return Condition(*(None if t is None else f(t) for t in self.parts()))
+
+    def parts(self):
+        return [getattr(self, f.name) for f in fields(self)]
 
     def at(self, tokens):
         """The conditioning of some tokens (a slice)."""
         return self.map(lambda t: t[:, tokens])
 
     def dropped(self, *which):
-        """The same with the flags of some modalities cleared; all of them without arguments."""
+        """The same with the flags of some modalities cleared; all of them, sounds too, without arguments."""
         flags = self.flags.clone()
         flags[..., list(which) or slice(None)] = 0
-        return Condition(self.user, self.agent, self.voice, self.gaze, flags)
+        return replace(self, flags=flags, heard=self.heard if which or self.heard is None else torch.zeros_like(self.heard))
 
 
 def cat_conditions(parts, dim=0):
-    return Condition(*(torch.cat([getattr(p, n) for p in parts], dim) for n in ("user", "agent", "voice", "gaze", "flags")))
+    rows = zip(*(p.parts() for p in parts))
+    return Condition(*(None if row[0] is None else torch.cat(row, dim) for row in rows))
 
 
-def absent(batch, tokens, audio_features, device=None):
+def sound_width(features):
+    """Width of a token's sound vector: features of what is heard and the level at both ears in four frames, place of the source (known, sine and
+    cosine of its bearing, log2 of its distance - 1, height - 1.5), sensitivity."""
+    return 4 * features + 4 * 2 + 5 + 1
+
+
+def absent(batch, tokens, audio_features, device=None, sound_features=0):
     z = lambda *shape: torch.zeros(*shape, device=device)
+    sound = (z(batch, tokens, sound_width(sound_features)), z(batch, tokens, 1)) if sound_features else ()
     return Condition(z(batch, tokens, 8), z(batch, tokens, 4 * audio_features), z(batch, tokens, 4 * audio_features),
-                     z(batch, tokens, 4), z(batch, tokens, 4))
+                     z(batch, tokens, 4), z(batch, tokens, 4), *sound)
 
 
 def tau_embedding(tau, width):
@@ -55,7 +69,8 @@ def tau_embedding(tau, width):
 
 class FlowNet(nn.Module):
     def __init__(self, latent=64, audio_features=64, layers=4, width=256, heads=4, mlp=4, tau_width=128, window_blocks=48,
-                 embed_latent=128, embed_user=64, embed_voice=64, embed_gaze=16, user_scale=2.0):
+                 embed_latent=128, embed_user=64, embed_voice=64, embed_gaze=16, user_scale=2.0, sound_features=0, embed_sound=64):
+        """`sound_features`: features of what is heard in the room, 0 for a network that hears none."""
         super().__init__()
         self.window, self.head_dim, self.heads, self.user_scale = window_blocks, width // heads, heads, user_scale
         self.tau_width, self.width = tau_width, width
@@ -65,6 +80,11 @@ class FlowNet(nn.Module):
         self.embed_voice = nn.Linear(4 * audio_features, embed_voice)
         self.embed_gaze = nn.Linear(4, embed_gaze)
         self.input = nn.Linear(embed_latent + embed_user + 2 * embed_voice + embed_gaze + 4, width)
+        self.sound_features = sound_features
+        if sound_features:
+            self.embed_sound = nn.ModuleDict({"0": nn.Linear(sound_width(sound_features), embed_sound), "2": nn.Linear(embed_sound, embed_sound)})
+            self.input_sound = nn.Linear(embed_sound + 1, width, bias=False)
+            nn.init.zeros_(self.input_sound.weight)
         self.tau = nn.ModuleDict({"0": nn.Linear(tau_width, tau_width), "2": nn.Linear(tau_width, tau_width)})
         self.layers = nn.ModuleList(Layer(width, heads, mlp, tau_width) for _ in range(layers))
         self.final = nn.ModuleDict({"mod": nn.Linear(tau_width, 2 * width), "out": nn.Linear(width, latent)})
@@ -77,14 +97,25 @@ class FlowNet(nn.Module):
         return self.tau["2"](F.silu(self.tau["0"](tau_embedding(tau, self.tau_width))))
 
     def conditioning(self, cond):
-        """Everything of the input but the latent: [B, T, ...] concatenated embeddings, each times its flag, then the flags."""
+        """Everything of the input but the latent: [B, T, ...] concatenated embeddings, each times its flag, then the flags; of networks that hear the
+        room that of sounds and its flag behind them."""
         flag = [cond.flags[..., i:i + 1] for i in range(4)]
         user = self.embed_user["2"](gelu(self.embed_user["0"](cond.user / self.user_scale)))
-        return torch.cat([user * flag[USER], self.embed_agent(cond.agent) * flag[AGENT], self.embed_voice(cond.voice) * flag[VOICE],
-                          self.embed_gaze(cond.gaze) * flag[GAZE], cond.flags], -1)
+        out = [user * flag[USER], self.embed_agent(cond.agent) * flag[AGENT], self.embed_voice(cond.voice) * flag[VOICE],
+               self.embed_gaze(cond.gaze) * flag[GAZE], cond.flags]
+        if self.sound_features:
+            if cond.sound is None:
+                out.append(torch.zeros(*cond.flags.shape[:-1], self.input_sound.in_features, device=cond.flags.device))
+            else:
+                out += [self.embed_sound["2"](gelu(self.embed_sound["0"](cond.sound))) * cond.heard, cond.heard]
+        return torch.cat(out, -1)
 
     def tokens(self, z, conditioning):
-        return self.input(torch.cat([self.embed_latent(z), conditioning.to(z.dtype)], -1))
+        conditioning = conditioning.to(z.dtype)
+        if not self.sound_features:
+            return self.input(torch.cat([self.embed_latent(z), conditioning], -1))
+        usual, sound = conditioning.split([conditioning.shape[-1] - self.input_sound.in_features, self.input_sound.in_features], -1)
+        return self.input(torch.cat([self.embed_latent(z), usual], -1)) + self.input_sound(sound)
 
     def finish(self, x, c):
         shift, scale = self.final["mod"](F.silu(c)).chunk(2, -1)

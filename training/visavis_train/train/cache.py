@@ -2,14 +2,17 @@
 
     python -m visavis_train.train.cache --corpus DIR --vae runs/vae.pt --audio runs/audio.pt --out runs/cache
 
-Writes OUT/{train,val}.pt. Latents are encoded at two phases (frame offsets 4 and 6), so that a window need not start where a clip does.
+Writes OUT/{train,val}.pt. Latents are encoded at two phases (frame offsets 4 and 6), so that a window need not start where a clip does. With --hearing,
+of a corpus of `visavis_train.hearing.corpus`, also what was heard in the room. `--join A B` makes one cache of several.
 """
 import argparse
 import os
 
+import numpy as np
 import torch
 
 from ..corpus import measures, store
+from ..hearing import ears
 from ..motion import rig
 from ..nets.audio import AudioEncoder
 from ..nets.vae import Vae
@@ -76,6 +79,46 @@ def features(audio, clip, frames):
             "has": (clip.agent_voice is not None, clip.user_voice is not None)}
 
 
+@torch.no_grad()
+def rooms(clips, encoder, gaze):
+    """What was heard in the room in each clip: features [N, D_s] f16, levels [N, 2], source [N, 3], known [N], where the body reacts [N], sensitivity
+    [clips], features of silence [D_s]; and the gaze score [N], its mean elsewhere in the clip while the body reacts: a target is for conversation."""
+    frames, told = [], gaze.clone()
+    sensitivity = torch.zeros(len(clips))
+    for i, path in enumerate(clips.paths):
+        with np.load(path.replace(".safetensors", ".npz")) as kept:
+            wave = torch.from_numpy(kept["wave"]).float() / 32767
+            frames.append([ears.listen(encoder, wave).half()] + [torch.from_numpy(kept[k]) for k in ("levels", "place", "known", "reacts")])
+            part, reacts = slice(int(clips.starts[i]), int(clips.starts[i + 1])), frames[-1][-1]
+            sensitivity[i] = float(kept["sensitivity"])
+        if (~reacts).any():
+            told[part] = torch.where(reacts, gaze[part][~reacts].mean(), gaze[part])
+    sound, levels, source, known, reacts = (torch.cat(x) for x in zip(*frames))
+    return {"sound": sound, "levels": levels, "source": source, "known": known, "reacts": reacts, "sensitivity": sensitivity, "hears": torch.ones(len(clips), dtype=torch.bool),
+            "silence": ears.listen(encoder, torch.zeros(8 * ears.FRAME))[-1], "gaze": told}
+
+
+def join(caches, split):
+    """One cache of several with the same standard of latents; clips without sounds hear nothing."""
+    parts = [common.load(os.path.join(c, split + ".pt"), mmap=True) for c in caches]
+    clip, frame, row, out = 0, 0, 0, {"names": [], "starts": [torch.zeros(1, dtype=torch.long)], "segments": []}
+    hearing = next((p for p in parts if "sound" in p), None)
+    for p in parts:
+        if not torch.equal(p["latent_mean"], parts[0]["latent_mean"]):
+            raise SystemExit("caches to be joined must have one standard: --standard FLOW")
+        frames = int(p["starts"][-1])
+        empty = {} if hearing is None else {k: torch.zeros(len(p["names"]) if k in ("sensitivity", "hears") else frames, *hearing[k].shape[1:], dtype=hearing[k].dtype)
+                                            for k in ("sound", "levels", "source", "known", "reacts", "sensitivity", "hears")}
+        for name in ("z", "has", "still", "roots", "user", "gaze", "agent", "voice", *empty):
+            out.setdefault(name, []).append(p[name] if name in p else empty[name])
+        out["names"] += p["names"]
+        out["starts"].append(p["starts"][1:] + frame)
+        out["segments"].append(p["segments"] + torch.tensor([clip, frame, row, 0]))
+        clip, frame, row = clip + len(p["names"]), frame + frames, row + len(p["z"])
+    joined = {k: v if k == "names" else torch.cat(v) for k, v in out.items()}
+    return joined | {k: parts[0][k] for k in ("latent_mean", "latent_std")} | ({"silence": hearing["silence"]} if hearing else {})
+
+
 def latents(clips, vae, mean, std, which):
     """{clip: [latents of each phase]} of clips `which`."""
     out = {}
@@ -120,22 +163,29 @@ def joined(clips, made, stats):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--corpus", required=True)
+    parser.add_argument("--corpus")
+    parser.add_argument("--join", nargs="+", metavar="CACHE", help="caches to make one of, instead of a corpus")
+    parser.add_argument("--hearing", help="encoder of what is heard in the room (`hearing.encoder`), for a corpus with sounds")
     parser.add_argument("--vae", help="needed without --latents-of")
     parser.add_argument("--audio", help="needed without --features-of")
     parser.add_argument("--out", required=True)
     parser.add_argument("--latents-of", metavar="CACHE", help="take the latents of an earlier cache of this corpus: only the audio encoder has changed")
     parser.add_argument("--features-of", metavar="CACHE", help="take the voices' features of an earlier cache of this corpus: only the VAE has changed")
     parser.add_argument("--standard", metavar="FLOW", help="standardise latents as this flow's checkpoint does, not by their own mean and deviation")
+    parser.add_argument("--splits", default="train,val")
     parser.add_argument("--workers", type=int, default=1, help="processes that share the clips")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
     args = parser.parse_args()
     device, team = common.start_process(args), Team(args.workers)
     os.makedirs(args.out, exist_ok=True)
+    if args.join:
+        for split in args.splits.split(","):
+            common.save(os.path.join(args.out, split + ".pt"), **join(args.join, split))
+        return
     standard = common.load(args.standard) if args.standard else None
     stats = (standard["latent_mean"], standard["latent_std"]) if standard else None
-    for split in ("train", "val"):
+    for split in args.splits.split(","):
         clips = team.first(lambda: Split(args.corpus, split, workers=args.workers))
         mine, state = range(team.rank, len(clips), team.size), {}
         for source, names in ((args.latents_of, ("z", "segments", "latent_mean", "latent_std")), (args.features_of, ("agent", "voice"))):
@@ -156,6 +206,8 @@ def main():
                 state |= {name: torch.cat([parts[i][who] for i in range(len(clips))]) for who, name in enumerate(("agent", "voice"))}
         if team.leads:
             shared = {name: getattr(clips, name).clone() for name in ("roots", "user", "gaze")}
+            if args.hearing:
+                shared |= rooms(clips, load_audio(args.hearing), shared["gaze"])
             common.save(os.path.join(args.out, split + ".pt"), names=clips.names, starts=clips.starts, has=clips.has, still=still(clips), **shared, **state)
             print(f"{split}: {len(clips)} clips, {int(clips.starts[-1]) / 108000:.2f} hours", flush=True)
     team.close()

@@ -55,16 +55,19 @@ def rate(peak, step, progress, warmup=200, floor=0.02):
     return peak * min(1.0, (step + 1) / warmup) * (floor + (1 - floor) * 0.5 * (1 + math.cos(math.pi * progress)))
 
 
-def optimiser(net, lr, decay=1e-2):
-    """AdamW; matrices decay, vectors do not."""
-    every = [p for p in net.parameters() if p.requires_grad]
-    groups = [{"params": [p for p in every if p.dim() > 1], "weight_decay": decay}, {"params": [p for p in every if p.dim() <= 1], "weight_decay": 0.0}]
-    return torch.optim.AdamW(groups, lr=lr, betas=(0.9, 0.99), fused=every[0].is_cuda)
+def optimiser(net, lr, decay=1e-2, fresh=1.0):
+    """AdamW; matrices decay, vectors do not. `fresh`: factor on the rate of what embeds sounds."""
+    groups = [{"params": [], "weight_decay": w, "scale": scale} for scale in (1.0, fresh) for w in (decay, 0.0)]
+    for name, p in net.named_parameters():
+        if p.requires_grad:
+            groups[2 * ("_sound." in name) + (p.dim() <= 1)]["params"].append(p)
+    every = [p for g in groups for p in g["params"]]
+    return torch.optim.AdamW([g for g in groups if g["params"]], lr=lr, betas=(0.9, 0.99), fused=every[0].is_cuda)
 
 
 def set_rate(optim, lr):
     for group in optim.param_groups:
-        group["lr"] = lr
+        group["lr"] = lr * group.get("scale", 1.0)
 
 
 def save(path, **state):

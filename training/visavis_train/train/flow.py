@@ -87,7 +87,7 @@ def apart_loss(net, z, cond, metric, slip, weight, late):
 def load_flow(path, device="cpu"):
     """The averaged flow or student of a checkpoint, and the checkpoint."""
     state = common.load(path)
-    net = FlowNet(state["latent"], state["audio"], **state["size"])
+    net = FlowNet(state["latent"], state["audio"], **state["size"], sound_features=state.get("sound", 0))
     net.load_state_dict(state["ema"])
     return net.eval().to(device), state
 
@@ -145,24 +145,29 @@ def main():
     parser.add_argument("--end-to-end", metavar="AUDIO", help="audio checkpoint to train along; needs --init and --corpus")
     parser.add_argument("--corpus", help="corpus of the cache, for --end-to-end")
     parser.add_argument("--live", type=int, help="windows of a batch whose voices --end-to-end hears, others taking cached features [all]")
+    parser.add_argument("--react", type=float, default=0.0, help="blocks in which the body reacts to a sound weigh 1 + REACT [0]")
+    parser.add_argument("--fresh", type=float, default=1.0, help="factor on the learning rate of what embeds sounds [1]")
+    parser.add_argument("--sounds", type=float, default=1.0, help="how much more often windows with sounds are drawn than their length says [1]")
     parser.add_argument("--init", help="flow checkpoint whose weights to start from")
     common.arguments(parser, steps=20000, lr=1.2e-3, batch=32)
     args = parser.parse_args()
     device, team = common.start_process(args), Team(args.workers)
     audio = load_audio(args.end_to_end, device).train() if args.end_to_end else None
     hearing = {"audio": audio, "voices": team.first(lambda: voices_of(args.corpus, "train", device)), "live": args.live} if audio else {}
-    train = Windows(os.path.join(args.cache, "train.pt"), args.blocks, device=device, **hearing)
+    train = Windows(os.path.join(args.cache, "train.pt"), args.blocks, device=device, sounds=args.sounds, **hearing)
     vae, mean, std, _ = load_vae(args.vae, device)
     plain = Windows(os.path.join(args.cache, "train.pt"), 16, jitter=False, device=device)
     metric = latent_metric(vae, mean, std, plain.batch(24)[0], train.mean.to(device), train.std.to(device))
     first = common.load(args.out if args.resume else args.init) if args.resume or args.init else None
     size, latent = first["size"] if first else SIZES[args.size]["flow"], train.z.shape[1]
-    net = FlowNet(latent, train.audio_features, **size).to(device)
+    net = FlowNet(latent, train.audio_features, **size, sound_features=train.sound_features).to(device)
     if first:
-        net.load_state_dict(first["net"])
+        learns = [] if first.get("sound", 0) == train.sound_features else [k for k in net.state_dict() if "_sound." in k]
+        if net.load_state_dict(first["net"], strict=False).missing_keys != learns:
+            raise SystemExit(f"{args.out if args.resume else args.init} has other sizes than this network")
         metric = first["metric"].to(device) if args.resume else metric
     spoken = {"spec": audio.spec, "features": train.audio_features} if audio else {}
-    loop = Loop(team, net, args, average=0.999, beside={"audio": audio} if audio else None, size=size, latent=latent, audio=train.audio_features,
+    loop = Loop(team, net, args, average=0.999, beside={"audio": audio} if audio else None, size=size, latent=latent, audio=train.audio_features, sound=train.sound_features,
                 latent_mean=train.mean, latent_std=train.std, metric=metric.cpu(), **spoken)
     if audio:
         hearing = {"audio": loop.averages["audio"].net, "voices": team.first(lambda: voices_of(args.corpus, "val", device))}
@@ -179,7 +184,7 @@ def main():
         apart = team.draw(args.seed, step) < share  # the same regime in all processes: none waits for the dearer one
         place = train.draw(args.batch)
         z, cond = train.batch(args.batch, place)
-        weight = 1 + args.still * train.stillness(*place)
+        weight = 1 + args.still * train.stillness(*place) + args.react * train.reacting(*place)
         loss = kinds[apart](net, z, cond, metric, args.slip, weight / weight.mean(), args.late)
         loop.update(loss, **{"apart" if apart else "shared": loss})
         loop.report(100, measure, 500)

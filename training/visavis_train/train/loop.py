@@ -30,7 +30,7 @@ class Loop:
         self.team, self.net, self.args, self.warmup, self.memory, self.kept = team, net, args, warmup, memory, kept
         self.beside = beside or {}
         self.trained, self.step, self.spent, self.steps = nn.ModuleList([net, *self.beside.values()]), 0, 0.0, args.steps if args.minutes is None else None
-        self.optim = common.optimiser(self.trained, args.lr)
+        self.optim = common.optimiser(self.trained, args.lr, fresh=getattr(args, "fresh", 1.0))
         state = common.load(args.out) if args.resume else None
         if state:
             weights = lambda kept: kept.get("net", kept["ema"])

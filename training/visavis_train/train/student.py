@@ -8,6 +8,7 @@ the user is seen from where the generated body stands. A teacher pass over a win
 """
 import argparse
 import os
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -66,6 +67,8 @@ class Rollouts:
             now = slice(k, k + 1)
             user = w.user[frames[:, 4 * k:4 * k + 4]]  # block k - 1's: `frames` begin with the block before the window
             cond.user[:, k] = to_local(root, user[..., [0, 2]].double()).float().flatten(1)
+            if w.sound_features:
+                cond.sound[:, k] = w.room(place[0], frames[:, 4 * k:4 * k + 4], root[:, None])[0][:, 0]
             new = stream.step(eps[:, now], cond.at(now))
             z[:, k] = new[:, 0]
             x = decoder.step(placed(new)) * self.std + self.mean
@@ -81,7 +84,7 @@ class Memory:
 
     def add(self, place, history, eps, wish, cond, own):
         rows = {"segment": place[0], "at": place[1], "history": history, "eps": eps, "wish": wish, "user": cond.user, "gaze": cond.gaze,
-                "flags": cond.flags, "own": torch.full((len(eps),), own)}
+                "flags": cond.flags, "own": torch.full((len(eps),), own)} | ({} if cond.sound is None else {"sound": cond.sound, "heard": cond.heard})
         slots = torch.arange(self.count, self.count + len(eps)) % self.size
         for name, value in rows.items():
             if name not in self.kept:
@@ -96,7 +99,8 @@ class Memory:
         at = lambda name: self.kept[name][rows.to(self.kept[name].device)]
         where = at("segment"), at("at")
         heard = self.windows.read(*where)[1]
-        return at("history"), at("eps"), at("wish"), Condition(at("user"), heard.agent, heard.voice, at("gaze"), at("flags")), at("own"), where
+        room = (at("sound"), at("heard")) if "sound" in self.kept else ()
+        return at("history"), at("eps"), at("wish"), Condition(at("user"), heard.agent, heard.voice, at("gaze"), at("flags"), *room), at("own"), where
 
     def state_dict(self):
         return {"count": self.count, "kept": self.kept}
@@ -113,18 +117,19 @@ def targets(cond, gaze):
     wish = torch.where(torch.rand(b, 1, 1) < 0.3, torch.randint(0, 2, (b, 1, 1)).float(), torch.rand(b, 1, 1) * 1.1 - 0.1).to(cond.gaze.device)
     flags = cond.flags.clone()
     flags[..., GAZE] = 1
-    return Condition(cond.user, cond.agent, cond.voice, wish.expand_as(cond.gaze).clone(), flags)
+    return replace(cond, gaze=wish.expand_as(cond.gaze).clone(), flags=flags)
 
 
 def beginning(flow, init=None, change=None):
-    """Weights to start from: the flow's, those of the checkpoint `init`, or the flow's with the `change` from one checkpoint to another."""
+    """Weights to start from: the flow's, those of the checkpoint `init`, or the flow's with the `change` from one checkpoint to another (none where
+    that one has no such weights)."""
     ema = lambda path: common.load(path)["ema"]
     if init:
         return ema(init)
     if not change:
         return flow
     before, after = map(ema, change)
-    return {k: v + after[k] - before[k] for k, v in flow.items()}
+    return {k: v + after[k] - before[k] if k in before else v for k, v in flow.items()}
 
 
 def calibrated(cond, pairs):
@@ -132,7 +137,7 @@ def calibrated(cond, pairs):
     if not pairs:
         return cond
     asked = np.interp(cond.gaze.cpu().numpy(), *zip(*pairs))
-    return Condition(cond.user, cond.agent, cond.voice, torch.from_numpy(asked).float().to(cond.gaze.device), cond.flags)
+    return replace(cond, gaze=torch.from_numpy(asked).float().to(cond.gaze.device))
 
 
 def rest_weight(wish, history, still):
@@ -169,11 +174,12 @@ def main():
     parser.add_argument("--still", type=float, default=0.0, help="blocks that the teacher leaves at rest weigh up to 1 + STILL [0]")
     parser.add_argument("--matching", type=float, default=0.0, help="weight of distribution matching (train/matching.py) [0]")
     parser.add_argument("--adversarial", type=float, default=0.0, help="weight of the adversarial loss on decoded motion [0]")
+    parser.add_argument("--sounds", type=float, default=1.0, help="how much more often windows with sounds are drawn than their length says [1]")
     parser.add_argument("--memory", type=int, default=800, help="sequences that updates draw on")
     common.arguments(parser, steps=3000, lr=4e-4, batch=16)
     args = parser.parse_args()
     device, team = common.start_process(args), Team(args.workers)
-    windows = Windows(os.path.join(args.cache, "train.pt"), args.blocks, 0.03, 0.02, 0, 0.05, device=device)
+    windows = Windows(os.path.join(args.cache, "train.pt"), args.blocks, 0.03, 0.02, 0, 0.05, device=device, sounds=args.sounds)
     vae, mean, std, _ = load_vae(args.vae, device)
     vae.requires_grad_(False)
     (teacher, base), (net, _) = load_flow(args.flow, device), load_flow(args.flow, device)
@@ -183,7 +189,7 @@ def main():
         raise SystemExit(f"{args.cache} standardises latents otherwise than {args.flow}: make it with --standard {args.flow}")
     if "metric" not in base:  # a bundle's
         base["metric"] = latent_metric(vae, mean, std, windows.batch(24)[0][:, :16], windows.mean.to(device), windows.std.to(device)).cpu()
-    metric, kept = base["metric"].to(device), {k: base[k] for k in ("size", "latent", "audio", "latent_mean", "latent_std", "metric")}
+    metric, kept = base["metric"].to(device), {k: base[k] for k in ("size", "latent", "audio", "sound", "latent_mean", "latent_std", "metric") if k in base}
     memory = Memory(windows, args.memory)
     decode = lambda z: vae.decoder(z * windows.std.to(device) + windows.mean.to(device)) * std + mean
     critic = Critic(load_flow(args.flow, device)[0].train(), teacher) if args.matching else None

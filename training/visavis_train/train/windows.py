@@ -2,6 +2,7 @@
 import torch
 import torch.nn.functional as F
 
+from ..hearing import ears
 from ..nets.flow import GAZE, Condition
 from . import common
 from .common import mixed
@@ -25,7 +26,8 @@ class Windows:
     """Random windows of `blocks` blocks from a cache file, on `device`. With `audio`, an encoder in training, the first `live` windows of a batch
     (or all) take their features from `voices` [N, 2, 800] i16, with gradients; the others take the cached ones."""
 
-    def __init__(self, cache, blocks, drop=0.05, drop_all=0.1, drop_gaze=0.35, prefix=0.1, jitter=True, device="cpu", audio=None, voices=None, live=None):
+    def __init__(self, cache, blocks, drop=0.05, drop_all=0.1, drop_gaze=0.35, prefix=0.1, jitter=True, device="cpu", audio=None, voices=None, live=None, sounds=1.0):
+        """`sounds`: how much more often clips in which sounds are heard are drawn than their length says."""
         state = common.load(cache, mmap=True)
         self.blocks, self.device = blocks, torch.device(device)
         self.drop, self.drop_all, self.drop_gaze, self.prefix, self.jitter = drop, drop_all, drop_gaze, prefix, jitter
@@ -37,6 +39,11 @@ class Windows:
         if not len(self.segments):
             raise SystemExit(f"{cache} has no clip of {blocks} blocks ({blocks * 4 / 30:.1f} s)")
         self.weights = self.segments[:, 3].float()
+        self.sound_features = state["sound"].shape[1] if "sound" in state else 0
+        if self.sound_features:
+            for name in ("sound", "levels", "source", "known", "reacts", "hears", "sensitivity", "silence"):
+                setattr(self, name, state[name].to(self.device))
+            self.weights = self.weights * torch.where(state["hears"][self.segments[:, 0]], sounds, 1.0)
         spans = list(zip(self.starts[:-1].tolist(), self.starts[1:].tolist()))
         self.gaze = torch.stack([torch.cat([smooth(state["gaze"][a:b], w) for a, b in spans]) for w in SMOOTH]).to(self.device)
 
@@ -66,11 +73,39 @@ class Windows:
         flags = torch.ones(b, n, 4, device=self.device)
         flags[..., 1:3] = self.has[segment[:, 0]].to(self.device)[:, None]
         together = lambda x: x.float().reshape(b, n, -1)
-        return z, Condition(user.flatten(2), together(self.agent[now]), together(self.voice[before]), gaze.reshape(b, n, 4), flags)
+        room = self.room(segment, frames, self.roots[before[:, 3::4]]) if self.sound_features else ()
+        return z, Condition(user.flatten(2), together(self.agent[now]), together(self.voice[before]), gaze.reshape(b, n, 4), flags, *room)
+
+    def room(self, segment, frames, roots):
+        """Sound vectors [B, K, S] and their flags [B, K, 1] of the K blocks behind frames [B, 4 + 4 K] (or 4 K), for an agent at roots [B, K, 3] when
+        they begin. Clips without sounds have silence and no flag."""
+        b, k = roots.shape[:2]
+        before, hears = frames[:, :4 * k].reshape(b * k, 4), self.hears[segment[:, 0]].repeat_interleave(k)
+        features = torch.where(hears[:, None, None], self.sound[before].float(), self.silence)
+        levels = torch.where(hears[:, None, None], self.levels[before], self.levels.new_tensor(ears.SILENT))
+        sound = ears.vector(features, levels, self.source[before[:, 3]], self.known[before[:, 3]] & hears, roots.reshape(b * k, 3),
+                            self.sensitivity[segment[:, 0]].repeat_interleave(k))
+        return sound.unflatten(0, (b, k)), hears.float().reshape(b, k, 1)
+
+    def overheard(self, sound, heard, segment):
+        """Flags [B, K, 1] as sessions have them: in half of the windows sounds are absent until the first; half of the others hear silence, at any
+        sensitivity. Where sounds are heard the modality is never left out by itself: the body would seem to react to nothing."""
+        b, coin, hears = len(sound), torch.rand(len(sound), 1, 1, device=sound.device) < 0.5, self.hears[segment[:, 0]].reshape(-1, 1, 1)
+        levels = sound[..., 4 * self.sound_features:4 * self.sound_features + 8]
+        begun = ((levels > ears.SILENT + 0.1).any(-1, keepdim=True) | (sound[..., -6:-5] > 0)).cumsum(1) > 0
+        any_genre = torch.randint(-1, 2, (b, 1), device=sound.device).to(sound.dtype)
+        sound = torch.cat([sound[..., :-1], torch.where(hears, sound[..., -1:], any_genre[:, None])], -1)
+        return sound, torch.where(hears, (begun | coin).float(), coin.expand(heard.shape).float())
 
     def stillness(self, segment, at):
         """Share of each block's frames [B, K] in which both hands are still."""
         return self.still[self.frames(segment, at)[:, 4:]].float().unflatten(1, (self.blocks, 4)).mean(-1)
+
+    def reacting(self, segment, at):
+        """Share of each block's frames [B, K] in which the body reacts to a sound."""
+        if not self.sound_features:
+            return 0.0
+        return self.reacts[self.frames(segment, at)[:, 4:]].float().unflatten(1, (self.blocks, 4)).mean(-1)
 
     def hear(self, segment, at):
         """Agent's and user's features [B, K, 4 D_a] each, straight from the voices."""
@@ -102,10 +137,16 @@ class Windows:
             user = (torch.stack([c * user[..., 0] + s * user[..., 1], c * user[..., 1] - s * user[..., 0]], -1) + shift).flatten(2)
         keep = (torch.rand(size, 1, 4) >= self.drop).float()
         keep[..., GAZE] = (torch.rand(size, 1) >= self.drop_gaze).float()
-        keep = keep * (torch.rand(size, 1, 1) >= self.drop_all).float()
+        every = (torch.rand(size, 1, 1) >= self.drop_all).float()
+        keep = keep * every
         start = torch.where(torch.rand(size, 1) < self.prefix, torch.randint(1, n, (size, 1)), torch.zeros(size, 1, dtype=torch.long))
         keep = keep * (torch.arange(n)[None] >= start).float()[..., None]
-        return z, Condition(user, agent, voice, cond.gaze, cond.flags * keep.to(device))
+        sound, heard = cond.sound, cond.heard
+        if self.sound_features:
+            if self.jitter:
+                sound, heard = self.overheard(sound, heard, place[0])
+            heard = heard * (every * (torch.arange(n)[None] >= start).float()[..., None]).to(device)
+        return z, Condition(user, agent, voice, cond.gaze, cond.flags * keep.to(device), sound, heard)
 
 
 def voices_of(corpus, split, device="cpu", workers=1):
