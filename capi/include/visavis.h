@@ -212,8 +212,6 @@ typedef struct visavis_session_options {
     float sensitivity;
     // 0.
     uint32_t reserved2;
-    // Of test builds.
-    uint64_t grown;
 } visavis_session_options;
 
 // One frame of motion, without its joints. World coordinates: metres, right-handed, Y up.
@@ -240,8 +238,6 @@ typedef struct visavis_frame {
     uint32_t sampler_steps;
     // How much of the frame is a held pose instead of the model's, 0 to 1.
     float held;
-    // Of test builds.
-    uint64_t grown;
 } visavis_frame;
 
 // One joint of a frame. Quaternions are x, y, z, w.
@@ -358,8 +354,6 @@ typedef struct visavis_stats {
     uint64_t sound_refused;
     // Sources that gave way to a louder one.
     uint64_t sound_replaced;
-    // Of test builds.
-    uint64_t grown;
 } visavis_stats;
 
 #ifdef __cplusplus
