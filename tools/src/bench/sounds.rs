@@ -2,7 +2,7 @@
 //! turns.
 
 use super::load::Times;
-use super::{Talks, WARM_UP};
+use super::{BenchOptions, Talks, WARM_UP};
 use crate::contents::made_with;
 use glam::Vec3;
 use serde::Serialize;
@@ -53,7 +53,8 @@ impl WithSounds {
         if blocks == 0 {
             return Err(Error::new(ErrorKind::Argument, "nothing to measure: at least one block"));
         }
-        let mut talks = [(); 2].map(|()| Talks::new(engine, sampler, threads, 1));
+        let alone = BenchOptions { sampler, threads, ..BenchOptions::default() };
+        let mut talks = [(); 2].map(|()| Talks::new(engine, &alone));
         let mut times = [Vec::with_capacity(blocks), Vec::with_capacity(blocks)];
         let mut turn = |count: usize, times: &mut [Vec<Duration>; 2]| -> Result<()> {
             for ((talks, times), sources) in talks.iter_mut().zip(times).zip([0, sources]) {

@@ -10,7 +10,7 @@ fn reactor() -> Reactor {
 
 fn sound(place: [f64; 3], start: f64, level: f32) -> Sound {
     let samples = (0..4800).map(|i| level * (i as f32 * 0.1).sin()).collect();
-    Sound { name: "tone".into(), samples, place: DVec3::from_array(place), start }
+    Sound { name: "tone".into(), samples, place: DVec3::from_array(place), start, id: None }
 }
 
 const OPTIONS: Options = Options { sensitivity: Some(1), steps: Some(4), seed: 3, threads: 1 };
