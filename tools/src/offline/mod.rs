@@ -414,10 +414,7 @@ mod tests {
         let bang = sound(0.3, 5_000, None);
         let pieces: Vec<_> = (0..6).map(|block| piece(&bang, block)).collect();
         // 7200 samples: 800 after the start of the third block.
-        assert_eq!(
-            pieces.iter().map(|p| p.as_ref().map_or(0, Vec::len)).collect::<Vec<_>>(),
-            [0, 0, 3200, 2600, 0, 0]
-        );
+        assert_eq!(pieces.iter().map(|p| p.as_ref().map_or(0, Vec::len)).collect::<Vec<_>>(), [0, 0, 3200, 2600, 0, 0]);
         let all: Vec<_> = pieces.into_iter().flatten().flatten().collect();
         assert!(all[..800].iter().all(|s| *s == 0.0) && all[800..] == bang.samples);
         let talk = |sounds| Conversation::read_with(None, None, None, sounds);
