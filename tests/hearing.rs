@@ -152,9 +152,9 @@ impl Reference {
                 })
             })
             .collect();
-        for ear in 0..2 {
+        for (ear, out) in self.ears.iter_mut().enumerate() {
             let (mut x1, mut y1) = (0.0, 0.0);
-            for n in first * FRAME_SAMPLES..length {
+            for (n, out) in out.iter_mut().enumerate().take(length).skip(first * FRAME_SAMPLES) {
                 let (t, w) = (n / FRAME_SAMPLES, (n % FRAME_SAMPLES + 1) as f64 / FRAME_SAMPLES as f64);
                 let (now, before) = (heard[t][ear], heard[if t > first { t - 1 } else { t }][ear]);
                 let mix = |a: f64, b: f64| a + (b - a) * w;
@@ -164,7 +164,7 @@ impl Reference {
                 let tap = |i: f64| if i < 0.0 { 0.0 } else { sound.get(i as usize).copied().unwrap_or(0.0) };
                 let x = tap(at.floor()) * (1.0 - (at - at.floor())) + tap(at.floor() + 1.0) * (at - at.floor());
                 let y = ((1.0 + a * Q) * x + (1.0 - a * Q) * x1 - (1.0 - Q) * y1) / (1.0 + Q);
-                self.ears[ear][n] += y * gain;
+                *out += y * gain;
                 (x1, y1) = (x, y);
             }
         }

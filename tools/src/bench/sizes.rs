@@ -51,7 +51,7 @@ impl Size {
         Engine::from_tensors(self.config(), &Tensors::seeded(scheme), kernels, networks)
     }
 
-    /// As [`Size::engine`], with hearing as in [`HEARING`].
+    /// As [`Size::engine`], with hearing as in `HEARING`.
     ///
     /// # Errors
     /// As [`Size::engine`].
