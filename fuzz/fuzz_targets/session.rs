@@ -189,9 +189,14 @@ fn take(session: &mut Session, step: Step, next: &mut Option<u64>) -> u32 {
             sound.iter_mut().enumerate().for_each(|(i, s)| *s = 60.0 * (i as f32 * 0.1).sin());
             let samples = &sound[..usize::from(len) % sound.len()];
             let place = Vec3::from(place.map(f32::from)) / 20.0;
-            session.sounds().push(u32::from(id), samples, rate, place).expect("a good sound");
+            let (sounds, hears) = (session.sounds(), session.sounds().is_heard());
+            let pushed = sounds.push(u32::from(id), samples, rate, place);
+            assert_eq!(pushed.is_ok(), hears, "a good sound");
         }
-        Step::EndSource(id) => session.end_sound(u32::from(id)).expect("a source or none"),
+        Step::EndSource(id) => {
+            let hears = session.sounds().is_heard();
+            assert_eq!(session.end_sound(u32::from(id)).is_ok(), hears, "a source or none");
+        }
         Step::Sensitivity(sensitivity) => typed(session.set_sensitivity(sensitivity)),
         Step::Head(p, time) => typed(session.push_user_head(Vec3::from(p), time)),
         Step::GoodHead(p, later) => {
