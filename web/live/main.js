@@ -108,7 +108,8 @@ async function start() {
     await sounds.drop(what, at, rate);
     page.dataset.dropped = Number(page.dataset.dropped ?? 0) + 1;
   }
-  const deaf = () => `${agent.facts.name} hears both voices, not the room: sounds need a model with hearing (visavis-room)`;
+  const hearing = assets.models.find(({ hears }) => hears);
+  const deaf = () => `${agent.facts.name} hears both voices, not the room: sounds need a model with hearing${hearing ? `, such as ${hearing.name}` : ""}`;
   // Two metres behind it, a little to the side.
   const behind = () => [root.x - 2 * Math.sin(root.yaw + 0.3), undefined, root.z - 2 * Math.cos(root.yaw + 0.3)];
 
