@@ -242,7 +242,8 @@ impl Engine {
         &self.config.rig
     }
 
-    /// Whether the bundle hears sounds in the room ([`Session::push_sound`](crate::Session::push_sound)).
+    /// Whether the bundle hears sounds in the room
+    /// ([`Session::push_sound`](crate::Session::push_sound)).
     pub fn has_hearing(&self) -> bool {
         self.hearing.is_some()
     }
@@ -293,8 +294,8 @@ impl Engine {
     }
 
     /// Bytes of packed weights that a block with `sampler` reads: the flow once per evaluation, the
-    /// decoder once, the audio encoder once per voice, that of sounds in the room once; of the kind `dram`, the predictors once per
-    /// frame. Re-anchoring and slots that catch up come on top.
+    /// decoder once, the audio encoder once per voice, that of sounds in the room once; of the kind
+    /// `dram`, the predictors once per frame. Re-anchoring and slots that catch up come on top.
     pub fn block_bytes(&self, sampler: Sampler) -> usize {
         2 * self.audio.bytes()
             + self.hearing.as_ref().map_or(0, AudioWeights::bytes)

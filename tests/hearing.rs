@@ -1,5 +1,6 @@
 //! Sounds in the room: what is heard of them is what two ears at the agent's head would hear, the
-//! same bits however they were brought, bounded whatever comes, and nothing at all before the first.
+//! same bits however they were brought, bounded whatever comes, and nothing at all before the
+//! first.
 
 mod common;
 
@@ -242,7 +243,8 @@ fn what_is_heard_is_what_two_ears_would_hear() {
         assert!(error < 1e-4, "block {block}: {error}");
         assert_eq!(stages.vector(block).unwrap()[..4 * HEARING.0], stages.0[&(block as u64, "hearing.features")]);
 
-        // The first of the largest, by the order in which they began, in the last frame in which one was loud enough.
+        // The first of the largest, by the order in which they began, in the last frame in which
+        // one was loud enough.
         let most = |frame: usize| {
             let loud = |id| (id, reference.salience.get(&id).map_or(f64::NEG_INFINITY, |s| s[frame]));
             [2, 7, 9].into_iter().map(loud).reduce(|a, b| if b.1 > a.1 { b } else { a }).unwrap()

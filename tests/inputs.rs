@@ -206,8 +206,8 @@ fn a_minute_is_kept() {
     assert_eq!(session.stats().inputs.agent_voice.underrun_samples, 0);
 }
 
-/// Half a second is enough for sound that is pushed as it is heard, and changes no bit; what is more
-/// is dropped and counted; less, or more than a minute, is refused.
+/// Half a second is enough for sound that is pushed as it is heard, and changes no bit; what is
+/// more is dropped and counted; less, or more than a minute, is refused.
 #[test]
 fn a_session_may_keep_less() {
     let inputs = inputs(24_000);

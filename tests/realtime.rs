@@ -224,8 +224,9 @@ fn a_running_session_does_not_allocate() {
     }
 }
 
-/// Sixteen sounds at once, some of a rate that is resampled, sources that come and go, a seventeenth, ends,
-/// alone and in a team: after each slot has had a sound of each rate, neither pushing nor computing allocates.
+/// Sixteen sounds at once, some of a rate that is resampled, sources that come and go, a
+/// seventeenth, ends, alone and in a team: after each slot has had a sound of each rate, neither
+/// pushing nor computing allocates.
 fn hearing_does_not_allocate() {
     let sound: Vec<f32> = (0..6_400).map(|i| 0.3 * (i as f32 * 0.05).sin()).collect();
     for (engine, threads) in [(hearing(), 1), (hearing_in(Scheme::I8), 2)] {

@@ -23,7 +23,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 const PIECE: usize = 256;
 /// Words of a record of the inbox: what it is, and two samples a word.
 const WORDS: usize = 1 + PIECE / 2;
-/// Records of the inbox that are kept for commands: sound that is too much is dropped before any command is.
+/// Records of the inbox that are kept for commands: sound that is too much is dropped before any
+/// command is.
 const COMMANDS: usize = 32;
 
 /// One of the two who talk.
@@ -89,8 +90,8 @@ impl VoiceInput {
     /// present. An empty push changes nothing.
     ///
     /// Up to a minute is kept ahead of the block that was computed last, or what the session's
-    /// options say; what is more is dropped and counted. Samples that are not finite are silence, those beyond 8 times full scale are
-    /// clipped; both are counted.
+    /// options say; what is more is dropped and counted. Samples that are not finite are silence,
+    /// those beyond 8 times full scale are clipped; both are counted.
     ///
     /// On a change of rate the old resampler's last samples come first, as if silence followed,
     /// then the new stream starts as if silence preceded it: a fade within 1.4 ms of the seam (4 ms
@@ -170,9 +171,9 @@ impl VoiceInput {
         self.command(Command::Clear);
     }
 
-    /// What is pushed from here on is another sound: what the resampler still holds is forgotten, and
-    /// the lag of resampling comes first again, so that a stream that is pushed as it is heard is
-    /// never short.
+    /// What is pushed from here on is another sound: what the resampler still holds is forgotten,
+    /// and the lag of resampling comes first again, so that a stream that is pushed as it is heard
+    /// is never short.
     pub(crate) fn begin(&self) {
         self.command(Command::Begin);
     }

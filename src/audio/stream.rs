@@ -3,7 +3,8 @@
 use super::input::VoiceInput;
 use super::line::{Glimpse, VoiceStats};
 
-/// A bounded stream of 24 kHz samples that any thread pushes into ([`Stream::input`]) and one reads.
+/// A bounded stream of 24 kHz samples that any thread pushes into ([`Stream::input`]) and one
+/// reads.
 pub struct Stream {
     input: VoiceInput,
     /// What [`Stream::look`] found.

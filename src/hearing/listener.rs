@@ -40,8 +40,9 @@ pub struct Hearing {
 }
 
 impl Hearing {
-    /// Takes all memory: 32 streams of ten seconds. The head's centre is `height` metres over the head
-    /// joint, along the head. The encoder hears silence on `exec`, whose width is at least its own.
+    /// Takes all memory: 32 streams of ten seconds. The head's centre is `height` metres over the
+    /// head joint, along the head. The encoder hears silence on `exec`, whose width is at least its
+    /// own.
     ///
     /// # Errors
     /// As [`AudioEncoder::new`].

@@ -273,8 +273,8 @@ impl Sources {
         None
     }
 
-    /// Says what stood out in the frames of a block, and forgets sources that are over and do not any
-    /// more.
+    /// Says what stood out in the frames of a block, and forgets sources that are over and do not
+    /// any more.
     fn judge(&mut self) {
         for t in 0..BLOCK_FRAMES {
             let heard = self.sources.iter().filter(|source| !source.new);

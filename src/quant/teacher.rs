@@ -3,10 +3,10 @@
 //!
 //! The reference is a session that runs freely over a scene: what it is told, free gaze included,
 //! is what any session with these options is told. The candidate is a session too, and computes
-//! every block from the reference's past: the same latents behind it (through its own weights), or of
-//! the kind `dram` the same memory, the same root and posture, the same noise, the same user. So the
-//! difference is that of one block, and does not grow. Its voices go through its own audio encoder.
-//! Neither re-anchors.
+//! every block from the reference's past: the same latents behind it (through its own weights), or
+//! of the kind `dram` the same memory, the same root and posture, the same noise, the same user. So
+//! the difference is that of one block, and does not grow. Its voices go through its own audio
+//! encoder. Neither re-anchors.
 
 use super::argument;
 use super::scene::Scene;

@@ -284,8 +284,8 @@ impl Inputs {
         }
     }
 
-    /// Takes notice of sounds in the room; `block` is due, with the agent at `root`. A sound that is
-    /// new begins with that block.
+    /// Takes notice of sounds in the room; `block` is due, with the agent at `root`. A sound that
+    /// is new begins with that block.
     pub(super) fn look_for_sounds(&mut self, block: u64, root: &Root) {
         self.hearing.iter_mut().for_each(|hearing| hearing.begin(block, root));
     }

@@ -31,8 +31,8 @@
 //! | `probe` | every stage of a block, for whoever wants to check the maths |
 //!
 //! Inputs and settings may come from any thread while a block is computed ([`VoiceInput`],
-//! [`HeadInput`], [`SoundInput`], [`Controls`]): nobody waits for the block, and a block goes by what was there
-//! when its poll began.
+//! [`HeadInput`], [`SoundInput`], [`Controls`]): nobody waits for the block, and a block goes by
+//! what was there when its poll began.
 //!
 //! After [`Session::poll`] has been called once, computing a block allocates nothing, takes no lock
 //! and makes no system call. The exceptions are outside the block: the first push of a voice, or a
@@ -217,17 +217,18 @@ impl Session {
         Ok(())
     }
 
-    /// Pushes a piece of what source `id` in the room gives off: mono `samples` of `rate` Hz, pascals
-    /// as they are 1 m from it (RMS 1 is 94 dB SPL); from now on it is at `position`, world metres.
-    /// The same as [`SoundInput::push`] of [`Session::sounds`], which says more.
+    /// Pushes a piece of what source `id` in the room gives off: mono `samples` of `rate` Hz,
+    /// pascals as they are 1 m from it (RMS 1 is 94 dB SPL); from now on it is at `position`, world
+    /// metres. The same as [`SoundInput::push`] of [`Session::sounds`], which says more.
     ///
-    /// What is pushed before the poll of a block sounds from that block's start on; the agent answers
-    /// with the block after it. Until the first push the agent is as one of a bundle without hearing, to
-    /// the bit.
+    /// What is pushed before the poll of a block sounds from that block's start on; the agent
+    /// answers with the block after it. Until the first push the agent is as one of a bundle
+    /// without hearing, to the bit.
     ///
     /// # Errors
     /// As [`SoundInput::push`]: [`ErrorKind::Argument`] where the bundle has no hearing, or for a
-    /// position that is no number; [`ErrorKind::Audio`] for a bad rate or samples that are not finite.
+    /// position that is no number; [`ErrorKind::Audio`] for a bad rate or samples that are not
+    /// finite.
     pub fn push_sound(&mut self, id: u32, samples: &[f32], rate: u32, position: Vec3) -> Result<()> {
         self.state.inputs.sounds().push(id, samples, rate, position)
     }

@@ -75,8 +75,8 @@ impl HeadInput {
         count(dropped);
     }
 
-    /// As [`HeadInput::push_pose`] of plain numbers: x, y and z, and the rotation's x, y, z and w. For
-    /// languages that have no vectors.
+    /// As [`HeadInput::push_pose`] of plain numbers: x, y and z, and the rotation's x, y, z and w.
+    /// For languages that have no vectors.
     pub fn push_numbers(&self, [x, y, z, qx, qy, qz, qw]: [f32; 7], time: f64) {
         self.push_pose(Vec3::new(x, y, z), Some(Quat::from_xyzw(qx, qy, qz, qw)), time);
     }

@@ -131,8 +131,8 @@ pub unsafe extern "C" fn visavis_push_pose(
     unsafe { with(session, |s| s.push_user_pose(Vec3::new(x, y, z), Some(rotation), time)) }
 }
 
-/// Pushes a piece of what sound source `id` gives off: mono samples, pascals as they are 1 m from it,
-/// 8000 to 192000 Hz; it is at (x, y, z) from now on, world metres.
+/// Pushes a piece of what sound source `id` gives off: mono samples, pascals as they are 1 m from
+/// it, 8000 to 192000 Hz; it is at (x, y, z) from now on, world metres.
 #[allow(clippy::too_many_arguments, reason = "a module takes numbers alone")]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_push_sound(
@@ -187,8 +187,8 @@ pub unsafe extern "C" fn visavis_set_budget(session: *mut Conversation, millisec
     unsafe { with(session, |s| s.set_governor(visavis::Governor::within(milliseconds))) }
 }
 
-/// Gives a session with a budget an engine of the kind `dram` to step down to instead of holding its
-/// pose; the engine may be freed afterwards.
+/// Gives a session with a budget an engine of the kind `dram` to step down to instead of holding
+/// its pose; the engine may be freed afterwards.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn visavis_set_fallback(session: *mut Conversation, engine: *const Engine) -> i32 {
     // SAFETY: the chapter on ownership, twice.

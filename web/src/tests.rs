@@ -66,7 +66,8 @@ impl Digest {
     }
 }
 
-/// With `rotations` the head is pushed with its own, with `sounds` there is one in the room that moves.
+/// With `rotations` the head is pushed with its own, with `sounds` there is one in the room that
+/// moves.
 fn motion(engine: *const Engine, options: &str, blocks: usize, rotations: bool, sounds: bool) -> String {
     let conversation = session(engine, options).unwrap();
     // SAFETY: alive.

@@ -47,7 +47,8 @@ impl WithSounds {
     /// blocks.
     ///
     /// # Errors
-    /// Those of making a session; [`ErrorKind::Argument`] for no blocks, or a bundle without hearing.
+    /// Those of making a session; [`ErrorKind::Argument`] for no blocks, or a bundle without
+    /// hearing.
     pub fn run(engine: &Arc<Engine>, options: SoundOptions) -> Result<Self> {
         let SoundOptions { sampler, threads, sources, blocks } = options;
         if blocks == 0 {

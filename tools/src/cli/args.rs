@@ -60,8 +60,8 @@ pub struct RunArgs {
     pub sampler: Sampler,
     #[command(flatten)]
     pub weights: GuidanceArgs,
-    /// How readily the agent reacts to sounds: dull, neutral, sensitive, or a number from -1.5 (dull
-    /// is -1) to 1.5
+    /// How readily the agent reacts to sounds: dull, neutral, sensitive, or a number from -1.5
+    /// (dull is -1) to 1.5
     #[arg(long, value_name = "NAME", value_parser = sensitivity, default_value = "neutral", allow_negative_numbers = true)]
     pub sensitivity: f32,
     /// Bundle [default: the shipped one, in models/ here, beside the program, or in its source

@@ -26,8 +26,8 @@ impl Sound {
     /// source, dB SPL; without it full scale is 1 pascal).
     ///
     /// # Errors
-    /// [`ErrorKind::Argument`] for another form, numbers that are none, a time below 0 or above 3600
-    /// s, a level outside 0 to 130 dB or of a silent file; those of [`Wav::read`].
+    /// [`ErrorKind::Argument`] for another form, numbers that are none, a time below 0 or above
+    /// 3600 s, a level outside 0 to 130 dB or of a silent file; those of [`Wav::read`].
     pub fn read(text: &str) -> Result<Self> {
         let Form { file, place, start, id, level } = parse(text)?;
         let path = Path::new(file);

@@ -18,8 +18,8 @@ pub struct Speed {
     pub weight_bytes: usize,
     /// Bytes of a session's key-value caches.
     pub cache_bytes: usize,
-    /// For each sampler (of bundles without any, their kind): its name, bytes of weights that a block reads, median milliseconds of a
-    /// block, and that over the reference's.
+    /// For each sampler (of bundles without any, their kind): its name, bytes of weights that a
+    /// block reads, median milliseconds of a block, and that over the reference's.
     pub samplers: Vec<(String, usize, f64, f64)>,
 }
 
