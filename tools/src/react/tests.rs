@@ -41,6 +41,8 @@ fn what_cannot_be_is_a_typed_error_and_what_is_too_loud_is_bounded() {
     assert_eq!(kind(&vec![good.clone(); 100], &OPTIONS), argument);
     assert_eq!(kind(&[sound([f64::NAN, 1.0, 1.0], 0.0, 0.5)], &OPTIONS), argument);
     assert_eq!(kind(&[sound([0.0, 1.6, 0.0], 0.0, 0.5)], &OPTIONS), argument);
+    assert_eq!(kind(&[sound([0.0, 1.6, 0.05], 0.0, 0.5)], &OPTIONS), argument);
+    assert_eq!(kind(&[sound([200.0, 1.0, 1.0], 0.0, 0.5)], &OPTIONS), argument);
     assert_eq!(kind(&[sound([2.0, 1.0, 1.0], 60.0, 0.5)], &OPTIONS), audio);
     assert_eq!(kind(&[Sound { samples: Vec::new(), ..good.clone() }], &OPTIONS), audio);
     assert_eq!(kind(&[Sound { samples: vec![f32::NAN], ..good.clone() }], &OPTIONS), audio);

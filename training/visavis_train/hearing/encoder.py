@@ -19,7 +19,7 @@ from ..train.team import Team
 from . import ears
 
 CHANNELS, FEATURES = (16, 32, 48, 64, 96, 96, 96), 32
-CLASSES = [c for c in sounds.CLASSES if c != "silence"] + ["silence"]
+SILENCE = sounds.CLASSES.index("silence")
 LATE = 3        # frames of a sound before its class can be told
 
 
@@ -38,11 +38,11 @@ class Batches:
     def batch(self, size):
         """Squashed waves [B, 800 T], classes [B, T], and how much each frame's counts [B, T]."""
         n = self.frames * FRAME_SAMPLES
-        waves, kinds, weights = np.zeros((size, n)), np.full((size, self.frames), len(CLASSES) - 1), np.ones((size, self.frames))
+        waves, kinds, weights = np.zeros((size, n)), np.full((size, self.frames), SILENCE), np.ones((size, self.frames))
         for i in range(size):
             if self.rng.random() < 0.95:
-                kind = int(self.rng.integers(len(CLASSES) - 1))
-                y, first = self._sound(CLASSES[kind]), int(self.rng.integers(0, self.frames // 2))
+                kind = int(self.rng.integers(SILENCE))     # silence is the last class
+                y, first = self._sound(sounds.CLASSES[kind]), int(self.rng.integers(0, self.frames // 2))
                 y = y[:n - first * FRAME_SAMPLES]
                 waves[i, first * FRAME_SAMPLES:first * FRAME_SAMPLES + len(y)] = y
                 last = first + -(-len(y) // FRAME_SAMPLES)
@@ -66,7 +66,7 @@ def main():
     train, held = (Batches(sounds.Sounds(args.data, split), args.frames, seed) for split, seed in (("train", args.seed), ("val", 1)))
     check, kinds, counts = held.batch(192)
     net = AudioEncoder(convolutions(*CHANNELS), FEATURES)
-    heads = nn.ModuleList([nn.Linear(FEATURES, 2 * BANDS + 4), nn.Linear(FEATURES, len(CLASSES))])
+    heads = nn.ModuleList([nn.Linear(FEATURES, 2 * BANDS + 4), nn.Linear(FEATURES, len(sounds.CLASSES))])
     loop = Loop(team, net, args, warmup=100, average=0.995, beside={"heads": heads}, spec=net.spec, features=FEATURES)
 
     @torch.no_grad()

@@ -130,11 +130,10 @@ class Room:
             elif e.reaction == "cover":
                 b = min(e.begin + 6, b)
             elif e.reaction == "run":
-                a = e.goals[1][0] if self.genre == "sensitive" else a
-                out = e.goals[0][1]
-                target[e.begin:e.goals[1][0]] = [out[0] * 4 - 3 * e.place[0], 1.4, out[1] * 4 - 3 * e.place[2]]
-                target[e.look:e.begin] = e.place if self.genre != "sensitive" else target[e.look:e.begin]
-                a = e.goals[1][0]
+                (_, out, _, _), (a, _, _, _) = e.goals     # away, and then a look back
+                if self.genre != "sensitive":
+                    target[e.look:e.begin] = e.place
+                target[e.begin:a] = [out[0] * 4 - 3 * e.place[0], 1.4, out[1] * 4 - 3 * e.place[2]]
             target[a:b] = e.place
             inside = slice(e.look, min(e.until, self.frames))
             offset[inside] *= (1 - keyed(self.frames, [0, e.look, e.look + 6, e.until, e.until + 10], np.array([0.0, 0, 1, 1, 0])))[inside, None]

@@ -177,6 +177,8 @@ def main():
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
     args = parser.parse_args()
+    if not (args.corpus or args.join):
+        parser.error("give --corpus, or --join with caches")
     device, team = common.start_process(args), Team(args.workers)
     os.makedirs(args.out, exist_ok=True)
     if args.join:
