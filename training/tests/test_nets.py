@@ -151,3 +151,12 @@ def test_a_student_sees_history_at_its_own_time_whatever_the_sampler_s_defaults(
     assert stream.past(0.0) == 0.9
     late = Stream(net, 1, tau_history=0.9, clean_from=0.3)
     assert [late.past(t) for t in (0.0, 0.25, 0.375, 0.95)] == [0.0, 0.25, 0.9, 0.95]
+
+
+def test_int8_bundles_are_read_as_floats():
+    scale, codes = torch.rand(3) + 0.1, torch.randint(-127, 128, (3, 4, 2), dtype=torch.int8)
+    read = bundle.dequantised({"audio.conv.0.weight": codes, "audio.conv.0.scale": scale, "audio.conv.0.bias": torch.ones(3)})
+    assert sorted(read) == ["audio.conv.0.bias", "audio.conv.0.weight"]
+    assert torch.equal(read["audio.conv.0.weight"], codes.float() * scale[:, None, None])
+    with pytest.raises(ValueError, match="int4"):
+        bundle.dequantised({"audio.out.weight": codes[:, :, 0].to(torch.uint8), "audio.out.scale": scale.half()})

@@ -124,13 +124,27 @@ def vae_from(config, features):
     return Vae(features, **{k: config[k] for k in ("latent", "layers", "width", "heads", "mlp", "window_blocks")})
 
 
+def dequantised(tensors):
+    """Tensors of a bundle with int8 weights as floats: each row times its scale."""
+    out = {k: v for k, v in tensors.items() if not k.endswith(".scale")}
+    for name, w in out.items():
+        scale = tensors.get(name.removesuffix(".weight") + ".scale")
+        if scale is None or not name.endswith(".weight"):
+            continue
+        if w.dtype != torch.int8:
+            raise ValueError(f"{name} is of {w.dtype}: int4 is too coarse to go on from, read the bundle that it was made of")
+        out[name] = w.float() * scale.float().reshape(-1, *[1] * (w.dim() - 1))
+    return out
+
+
 def read(path):
-    """Opens a bundle and builds its networks in fp32."""
+    """Opens a bundle (f32, f16 or int8) and builds its networks in fp32."""
     with safe_open(path, framework="pt") as f:
         config = json.loads(f.metadata()[KEY])
         tensors = {k: f.get_tensor(k) for k in f.keys()}
     if config["format"] != FORMAT:
         raise ValueError(f"{path} has format {config['format']}, this code reads {FORMAT}")
+    tensors = dequantised(tensors)
     features = 3 + 36 * len(config["rig"]["joints"])
     hearing = config.get("hearing")
     net = lambda: flow_from(config["flow"], config["vae"]["latent"], config["audio"]["features"], hearing)

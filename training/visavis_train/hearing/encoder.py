@@ -6,6 +6,7 @@ import argparse
 
 import numpy as np
 import torch
+from scipy.signal import lfilter, resample_poly
 from torch import nn
 
 from ..mospa import sounds
@@ -21,19 +22,25 @@ from . import ears
 CHANNELS, FEATURES = (16, 32, 48, 64, 96, 96, 96), 32
 SILENCE = sounds.CLASSES.index("silence")
 LATE = 3        # frames of a sound before its class can be told
+SPEEDS = ((1, 1), (9, 10), (10, 9), (10, 11), (11, 10), (8, 9), (9, 8), (7, 8), (8, 7))     # of a recording, with its pitch
 
 
 class Batches:
-    """Cuts of a sound that begins somewhere in them, at the levels of 1 to 5 m, over another one at times; on a quiet ground."""
+    """Cuts of a sound that begins somewhere in them, at the levels of 1 to 5 m, on a quiet ground. `vary`: played faster or slower, brighter or
+    duller, over another one at times: there are two dozen recordings of a class."""
 
-    def __init__(self, heard, frames, seed=0):
-        self.heard, self.frames, self.rng = heard, frames, np.random.default_rng(seed)
+    def __init__(self, heard, frames, seed=0, vary=False):
+        self.heard, self.frames, self.rng, self.vary = heard, frames, np.random.default_rng(seed), vary
 
     def _sound(self, kind):
         y, _ = self.heard.draw(self.rng, kind)
         y = y * 10 ** ((sounds.LEVEL[kind] + self.rng.uniform(-6, 6) - 94) / 20) / self.rng.uniform(1, 5)
         first = int(self.rng.integers(0, max(1, len(y) - 12 * FRAME_SAMPLES))) if self.rng.random() < 0.4 else 0
-        return y[first:]
+        y = y[first:first + 2 * self.frames * FRAME_SAMPLES]
+        if self.vary:
+            up, down = SPEEDS[self.rng.integers(len(SPEEDS))]
+            y = lfilter([1.0, self.rng.uniform(-0.5, 0.5)], [1.0, self.rng.uniform(-0.4, 0.4)], resample_poly(y, up, down))
+        return y
 
     def batch(self, size):
         """Squashed waves [B, 800 T], classes [B, T], and how much each frame's counts [B, T]."""
@@ -45,6 +52,9 @@ class Batches:
                 y, first = self._sound(sounds.CLASSES[kind]), int(self.rng.integers(0, self.frames // 2))
                 y = y[:n - first * FRAME_SAMPLES]
                 waves[i, first * FRAME_SAMPLES:first * FRAME_SAMPLES + len(y)] = y
+                if self.vary and self.rng.random() < 0.2:
+                    other = self._sound(sounds.CLASSES[int(self.rng.integers(SILENCE))])[:n]
+                    waves[i, :len(other)] += other * 0.1 * np.sqrt((np.square(y).mean() + 1e-12) / (np.square(other).mean() + 1e-12))
                 last = first + -(-len(y) // FRAME_SAMPLES)
                 kinds[i, first:last] = kind
                 weights[i, first:first + LATE] = 0
@@ -59,13 +69,16 @@ def main():
     parser.add_argument("--data", required=True, help="folder with sounds/ and speech/")
     parser.add_argument("--out", required=True)
     parser.add_argument("--frames", type=int, default=45)
+    parser.add_argument("--init", help="checkpoint of an encoder to go on from, say a bundle's (`visavis_train.checkpoints`)")
     common.arguments(parser, steps=1500, lr=2e-3, batch=24)
     args = parser.parse_args()
     common.start_process(args)
     team = Team(args.workers)
-    train, held = (Batches(sounds.Sounds(args.data, split), args.frames, seed) for split, seed in (("train", args.seed), ("val", 1)))
+    train, held = (Batches(sounds.Sounds(args.data, split), args.frames, seed, split == "train") for split, seed in (("train", args.seed), ("val", 1)))
     check, kinds, counts = held.batch(192)
     net = AudioEncoder(convolutions(*CHANNELS), FEATURES)
+    if args.init:
+        net.load_state_dict(common.load(args.init)["ema"])
     heads = nn.ModuleList([nn.Linear(FEATURES, 2 * BANDS + 4), nn.Linear(FEATURES, len(sounds.CLASSES))])
     loop = Loop(team, net, args, warmup=100, average=0.995, beside={"heads": heads}, spec=net.spec, features=FEATURES)
 
