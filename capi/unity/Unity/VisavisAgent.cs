@@ -32,6 +32,10 @@ namespace Visavis.Unity
         [Range(-1, 1)]
         public float gaze = 0.8f;
 
+        [Tooltip("How much it minds sounds in the room: -1 dull, 1 sensitive. Of bundles with hearing.")]
+        [Range(-1, 1)]
+        public float sensitivity = 0;
+
         [Tooltip("Milliseconds that a block may take; 0: no governor.")]
         [Range(0, 133)]
         public float budget = 100;
@@ -53,11 +57,14 @@ namespace Visavis.Unity
         Joint[] pose;
         Utterance saying;
         AudioClip clip;
-        float shownGaze, shownBudget;
+        float shownGaze, shownBudget, shownSensitivity;
         bool failed;
 
         /// <summary>The session once it runs, for pushes and settings; null before. Its Poll is the thread's.</summary>
         public Session Session => motion == null ? null : session;
+
+        /// <summary>Whether it hears sounds in the room (VisavisSound): whether its bundle has hearing. False while it loads.</summary>
+        public bool HasHearing => motion != null && engine.HasHearing;
 
         /// <summary>Session time, seconds; stands still while the application is paused.</summary>
         public double SessionTime => time.Elapsed.TotalSeconds;
@@ -98,6 +105,8 @@ namespace Visavis.Unity
                 var options = Engine.Options();
                 options.Gaze = gaze < 0 ? float.NaN : gaze;
                 options.BudgetMs = Math.Abs(budget) < 1 ? 0 : budget;
+                options.Sensitivity = sensitivity;
+                shownSensitivity = sensitivity;
                 shownGaze = gaze;
                 shownBudget = budget;
                 session = engine.NewSession(options);
@@ -147,6 +156,7 @@ namespace Visavis.Unity
                     session.PushUserPose(eyes.x, eyes.y, eyes.z, facing.x, facing.y, facing.z, facing.w, SessionTime);
                 }
                 if (gaze != shownGaze) session.SetGaze((shownGaze = gaze) < 0 ? (float?)null : gaze);
+                if (sensitivity != shownSensitivity) session.SetSensitivity(shownSensitivity = sensitivity);
                 if (budget != shownBudget) session.SetBudget((shownBudget = budget) < 1 ? 0 : budget);
                 if (saying != null && !double.IsNaN(saying.Start)) PlayInStep();
             }

@@ -9,6 +9,7 @@ namespace UnityEngine
     {
         public string name { get; set; }
         public static void Destroy(Object obj) { }
+        public static T[] FindObjectsOfType<T>() where T : Object => new T[0];
         public static bool operator ==(Object a, Object b) => ReferenceEquals(a, b);
         public static bool operator !=(Object a, Object b) => !ReferenceEquals(a, b);
         public static implicit operator bool(Object exists) => !ReferenceEquals(exists, null);
@@ -156,6 +157,10 @@ namespace UnityEngine
     public sealed class AudioSource : Behaviour
     {
         public AudioClip clip { get; set; }
+        public bool isPlaying => false;
+        public bool loop { get; set; }
+        public float volume { get; set; }
+        public int timeSamples { get; set; }
         public void PlayScheduled(double time) { }
     }
 
