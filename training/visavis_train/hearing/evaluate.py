@@ -21,6 +21,7 @@ from ..nets.flow import GAZE
 from ..nets.stream import DecoderStream, Stream
 from ..train.geometry import gaze, integrate, local_axes, local_positions, to_local, to_world
 from ..train.windows import Windows
+from . import ears
 
 WARM, BLOCKS, BEFORE = 16, 72, 20     # blocks of the corpus, of a window; blocks from a window's begin to the sound
 SEEN = 105                            # frames from the onset on that the classifier sees, every third
@@ -89,13 +90,17 @@ def train_judge(x, y, epochs=60, seed=0):
 
 
 @torch.no_grad()
-def roll(b, w, chosen, student=False, seed=0, target=None, quiet=False):
-    """Generated positions [B, T, J, 3], roots and gaze scores of windows (`events`), and the corpus' own. `quiet`: the same without the sounds."""
+def roll(b, w, chosen, student=False, seed=0, hears="sounds"):
+    """Generated positions [B, T, J, 3], roots, gaze scores and yaws of the head of windows (`events`). `hears`: "sounds", "silence" in their place, or
+    "nothing" (no hearing)."""
     torch.manual_seed(seed)
     segment, at = torch.stack([c[0] for c in chosen]), torch.tensor([c[1] for c in chosen])
     z, cond = w.read(segment, at)
-    if quiet:
+    hushed = silenced(w, cond.sound)
+    if hears == "nothing":
         cond.heard.zero_()
+    elif hears == "silence":
+        cond.sound = hushed
     frames, n, session = w.frames(segment, at), len(at), b.config["session"]
     cond.flags[..., GAZE] = 1
     settings = dict(student=True, tau=b.config["student"]["tau_history"]) if student else dict(student=False, tau=session["clean_history"]["tau"])
@@ -111,7 +116,8 @@ def roll(b, w, chosen, student=False, seed=0, target=None, quiet=False):
             new = z[:, now]
         else:
             cond.user[:, k] = to_local(root, w.user[frames[:, 4 * k:4 * k + 4]][..., [0, 2]].double()).float().flatten(1)
-            cond.sound[:, k] = w.room(segment, frames[:, 4 * k:4 * k + 4], root[:, None])[0][:, 0]
+            if hears == "sounds":
+                cond.sound[:, k] = w.room(segment, frames[:, 4 * k:4 * k + 4], root[:, None])[0][:, 0]
             new = stream.step(eps[:, now], cond.at(now))
         x = b.unstandardise(decoder.step(placed(new)))
         path = integrate(x[..., :3].double(), root)
@@ -123,6 +129,29 @@ def roll(b, w, chosen, student=False, seed=0, target=None, quiet=False):
     r = b.config["rig"]
     score = gaze(roots.float(), x, user.float(), r["eyes"], r["head_back"])
     return to_world(roots, local_positions(x).double()), roots, score, facing(x, roots)
+
+
+def silenced(w, sound):
+    """Sound vectors [B, K, S] with silence in the place of sounds, sensitivity kept."""
+    n = 4 * w.sound_features
+    out = torch.zeros_like(sound)
+    out[..., :n], out[..., n:n + 8], out[..., -1] = w.silence.repeat(4), ears.SILENT, sound[..., -1]
+    return out
+
+
+def alarms(run, judge, seed=0):
+    """Reactions that the judge sees in ten minutes of roll-outs in which nothing sounds, towards places drawn as sounds' are."""
+    positions, roots = run[:2]
+    rng, told = np.random.default_rng(seed), []
+    for first in range(4 * BEFORE, positions.shape[1] - SEEN, SEEN):
+        onset = torch.full((len(positions),), first)
+        angle, far = rng.uniform(-np.pi, np.pi, len(positions)), rng.uniform(1, 5, len(positions))
+        near = roots[:, first]
+        places = torch.stack([near[:, 0] + torch.tensor(far * np.sin(angle)), torch.full((len(positions),), 1.2), near[:, 1] + torch.tensor(far * np.cos(angle))], 1)
+        told.append(judge(moved(positions, roots, places, onset)).argmax(-1))
+    told = torch.cat(told)
+    minutes = len(told) * SEEN / 30 / 60
+    return {"minutes": round(minutes, 1), "in_ten_minutes": round(10 / minutes * int((told != 0).sum()), 2), "told": {r: int((told == i).sum()) for i, r in enumerate(REACTIONS)}}
 
 
 def facing(x, roots):
@@ -208,9 +237,10 @@ def main():
     w, chosen = events(args.corpus, args.split, os.path.join(args.cache, args.split + ".pt"))
     chosen = chosen[:: max(1, len(chosen) // args.limit)][:args.limit]
     out = {"corpus": figures(truth(w, (args.corpus, args.split), chosen, b), chosen, judge)}
-    for name, quiet in (("model", False), ("without sounds", True)):
-        parts = [roll(b, w, chosen[i:i + 40], args.student, i, quiet=quiet) for i in range(0, len(chosen), 40)]
-        out[name] = figures([torch.cat(p) for p in zip(*parts)], chosen, judge)
+    for name, hears in (("model", "sounds"), ("without sounds", "nothing"), ("silence", "silence")):
+        parts = [roll(b, w, chosen[i:i + 40], args.student, i, hears) for i in range(0, len(chosen), 40)]
+        run = [torch.cat(p) for p in zip(*parts)]
+        out[name] = figures(run, chosen, judge) if hears != "silence" else alarms(run, judge)
     with open(args.out, "w") as f:
         json.dump(out, f, indent=1)
     print(json.dumps(out, indent=1))
