@@ -216,13 +216,29 @@ pub struct HearingConfig {
     pub audio: AudioConfig,
     /// Width of the embedding of the sound vector.
     pub embed: usize,
+    /// What is made of what is heard.
+    pub appraisal: AppraisalConfig,
+}
+
+/// Which reaction a sound calls for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AppraisalConfig {
+    /// LSTM cells.
+    pub width: usize,
+    /// Names of the reactions.
+    pub reactions: Vec<String>,
 }
 
 impl HearingConfig {
-    /// Length S of a block's sound vector: features of 4 frames, levels of 4 frames at 2 ears, the
+    /// What a frame of the sound vector has: features, and shares of the reactions behind them.
+    pub fn told(&self) -> usize {
+        self.audio.features + self.appraisal.reactions.len()
+    }
+
+    /// Length S of a block's sound vector: what 4 frames have, levels of 4 frames at 2 ears, the
     /// place of what stands out (5), and the sensitivity.
     pub fn width(&self) -> usize {
-        4 * self.audio.features + 8 + 5 + 1
+        4 * self.told() + 8 + 5 + 1
     }
 }
 

@@ -13,6 +13,7 @@ use crate::dram::Dram;
 use crate::error::{Error, ErrorKind, Result};
 use crate::flow::ConditionLayout;
 use crate::frame::{BLOCK_FRAMES, Sampler};
+use crate::hearing::{AppraisalWeights, HearingWeights};
 use crate::kernels::{Exec, Kernels};
 use crate::rig::Rig;
 use std::path::Path;
@@ -67,7 +68,7 @@ pub struct Engine {
     pub(crate) kernels: Kernels,
     pub(crate) audio: AudioWeights,
     /// Of the encoder of sounds in the room, where the bundle has hearing.
-    pub(crate) hearing: Option<AudioWeights>,
+    pub(crate) hearing: Option<HearingWeights>,
     #[cfg(feature = "tract")]
     pub(crate) audio_source: AudioSource,
     pub(crate) model: Model,
@@ -179,9 +180,9 @@ impl Engine {
             return Err(Error::new(ErrorKind::Argument, message));
         }
         let audio_source = AudioSource::load(t, &config.audio, "audio")?;
-        let hearing = config.hearing.as_ref().map(|h| {
-            let source = AudioSource::load(t, &h.audio, "hearing")?;
-            source.pack(kernels, &h.audio)
+        let hearing = config.hearing.as_ref().map(|h| -> Result<_> {
+            let audio = AudioSource::load(t, &h.audio, "hearing")?.pack(kernels, &h.audio)?;
+            Ok(HearingWeights { audio, appraisal: AppraisalWeights::load(t, kernels, h)? })
         });
         let mut exec = exec(&config, kernels, 1)?;
         let model = match &config.dram {
@@ -286,7 +287,7 @@ impl Engine {
     /// Bytes of all packed weights.
     pub fn weight_bytes(&self) -> usize {
         self.audio.bytes()
-            + self.hearing.as_ref().map_or(0, AudioWeights::bytes)
+            + self.hearing.as_ref().map_or(0, HearingWeights::bytes)
             + match &self.model {
                 Model::Sarah(sarah) => sarah.bytes(),
                 Model::Dram(dram) => dram.bytes(),
@@ -298,7 +299,7 @@ impl Engine {
     /// `dram`, the predictors once per frame. Re-anchoring and slots that catch up come on top.
     pub fn block_bytes(&self, sampler: Sampler) -> usize {
         2 * self.audio.bytes()
-            + self.hearing.as_ref().map_or(0, AudioWeights::bytes)
+            + self.hearing.as_ref().map_or(0, HearingWeights::bytes)
             + match &self.model {
                 Model::Sarah(sarah) => sarah.block_bytes(sampler),
                 Model::Dram(dram) => BLOCK_FRAMES * dram.bytes(),
@@ -318,7 +319,8 @@ impl Engine {
 
 /// An executor for all networks of `config`.
 fn exec(config: &Config, kernels: Kernels, threads: usize) -> Result<Exec> {
-    let hearing = config.hearing.as_ref().map_or(0, |h| AudioEncoder::width(&h.audio));
+    let hearing = config.hearing.as_ref();
+    let hearing = hearing.map_or(0, |h| AudioEncoder::width(&h.audio).max(AppraisalWeights::width(h)));
     let audio = AudioEncoder::width(&config.audio).max(hearing);
     let (features, joints) = (config.audio.features, config.rig.len());
     let width = match &config.dram {

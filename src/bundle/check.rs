@@ -7,7 +7,9 @@
 
 use super::invalid;
 use crate::audio::check_audio_config;
-use crate::config::{AudioConfig, Config, DramConfig, GazeConfig, GazeCurve, Kind, LstmConfig, MospaConfig, TcnConfig};
+use crate::config::{
+    AudioConfig, Config, DramConfig, GazeConfig, GazeCurve, HearingConfig, Kind, LstmConfig, MospaConfig, TcnConfig,
+};
 use crate::error::Result;
 use crate::frame::feature_count;
 use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES};
@@ -126,6 +128,8 @@ fn sarah(c: &Config) -> Result<()> {
         check_audio_config(&h.audio).map_err(|e| invalid(format!("the config's hearing: {e}")))?;
         within("hearing.audio.features", h.audio.features, 1, 4096)?;
         within("hearing.embed", h.embed, 1, 4096)?;
+        within("hearing.appraisal.width", h.appraisal.width, 1, 1024)?;
+        within("hearing.appraisal.reactions", h.appraisal.reactions.len(), 1, 64)?;
         // What was heard is heard at the head of the frames before.
         within("user_delay_blocks", c.user_delay_blocks as usize, 1, 1)?;
     }
@@ -201,8 +205,10 @@ fn session_bytes(c: &Config) -> u128 {
         });
         layers.sum::<u128>()
     };
+    let appraisal = |h: &HearingConfig| product(&[12, h.appraisal.width + h.audio.features]);
     // The sources' samples, ten seconds each, come on top: they are the same for all models.
-    let hearing = c.hearing.as_ref().map_or(0, |h| encoder(&h.audio) + product(&[w.window_blocks + 9, h.width()]));
+    let hearing =
+        c.hearing.as_ref().map_or(0, |h| encoder(&h.audio) + product(&[w.window_blocks + 9, h.width()]) + appraisal(h));
     4 * (flow + vae + tokens + anchor + rows + modulation + predictors + 2 * encoder(&c.audio) + hearing)
 }
 

@@ -1,6 +1,7 @@
 //! From sources to what a block is told of them.
 
 use super::SoundStats;
+use super::appraisal::{Appraisal, AppraisalWeights};
 use super::head::{Head, level};
 use super::input::SoundInput;
 use super::sources::Sources;
@@ -19,6 +20,22 @@ const WARM_BLOCKS: usize = 4;
 /// Where the encoder's input bends, pascals.
 const SQUASH: f32 = 0.2;
 
+/// Weights of what hears the room.
+#[derive(Debug)]
+pub struct HearingWeights {
+    /// Encoder of what both ears hear.
+    pub audio: AudioWeights,
+    /// What is made of it.
+    pub appraisal: AppraisalWeights,
+}
+
+impl HearingWeights {
+    /// Bytes of all packed weights.
+    pub fn bytes(&self) -> usize {
+        self.audio.bytes() + self.appraisal.bytes()
+    }
+}
+
 /// One session's hearing. Allocates when made and never after.
 pub struct Hearing {
     sources: Sources,
@@ -31,6 +48,9 @@ pub struct Hearing {
     mixed: Box<[f32; BLOCK_SAMPLES]>,
     /// `[4, features]`.
     features: Vec<f32>,
+    appraisal: Appraisal,
+    /// Length of `vector` in front of the levels.
+    told: usize,
     /// `[S]`.
     vector: Vec<f32>,
     /// Whether there was anything to listen to in the block before.
@@ -46,11 +66,11 @@ impl Hearing {
     ///
     /// # Errors
     /// As [`AudioEncoder::new`].
-    pub fn new(exec: &mut Exec, config: &HearingConfig, weights: &AudioWeights, height: f32) -> Result<Self> {
+    pub fn new(exec: &mut Exec, config: &HearingConfig, weights: &HearingWeights, height: f32) -> Result<Self> {
         let mut encoder = AudioEncoder::new(&config.audio)?;
         let (silence, mut features) = ([0.0; BLOCK_SAMPLES], vec![0.0; BLOCK_FRAMES * config.audio.features]);
         exec.begin();
-        (0..WARM_BLOCKS).for_each(|_| encoder.encode(exec, weights, &silence, &mut features));
+        (0..WARM_BLOCKS).for_each(|_| encoder.encode(exec, &weights.audio, &silence, &mut features));
         exec.end();
         Ok(Self {
             sources: Sources::new(),
@@ -60,6 +80,8 @@ impl Hearing {
             ears: Box::new([[0.0; BLOCK_SAMPLES]; 2]),
             mixed: Box::new([0.0; BLOCK_SAMPLES]),
             features,
+            appraisal: Appraisal::new(config),
+            told: BLOCK_FRAMES * config.told(),
             vector: vec![0.0; config.width()],
             open: false,
             heard: false,
@@ -82,14 +104,23 @@ impl Hearing {
     }
 
     /// Hears what sounded in `block`, in whose frames the head joint was at `heads`.
-    pub fn listen(&mut self, exec: &mut Exec, weights: &AudioWeights, block: u64, heads: &[Transform; BLOCK_FRAMES]) {
-        let Self { sources, encoder, quiet, height, ears, mixed, features, vector, open, heard } = self;
+    pub fn listen(
+        &mut self,
+        exec: &mut Exec,
+        weights: &HearingWeights,
+        block: u64,
+        heads: &[Transform; BLOCK_FRAMES],
+        sensitivity: f32,
+    ) {
+        let Self { sources, encoder, quiet, height, ears, mixed, features, appraisal, told, vector, open, heard } =
+            self;
         *heard = sources.have_begun(block);
         if !*heard {
             return;
         }
         if !std::mem::replace(open, true) {
             encoder.set_context(quiet);
+            appraisal.forget();
         }
         ears.as_flattened_mut().fill(0.0);
         sources.hear(block, &heads.each_ref().map(|joint| Head::new(joint, *height)), ears);
@@ -98,13 +129,19 @@ impl Hearing {
             let middle = 0.5 * (left + right);
             *mixed = middle / (SQUASH + middle.abs());
         }
-        encoder.encode(exec, weights, &mixed[..], features);
-        vector[..features.len()].copy_from_slice(features);
-        let levels = &mut vector[features.len()..][..2 * BLOCK_FRAMES];
+        encoder.encode(exec, &weights.audio, &mixed[..], features);
+        let (told, rest) = vector.split_at_mut(*told);
+        let levels = &mut rest[..2 * BLOCK_FRAMES];
         let frames = left.chunks_exact(FRAME_SAMPLES).zip(right.chunks_exact(FRAME_SAMPLES));
         for (levels, (left, right)) in levels.chunks_exact_mut(2).zip(frames) {
             let scaled = [left, right].map(|ear| ((level(ear) - MIDDLE) / UNIT).clamp(-2.0, 3.5) as f32);
             levels.copy_from_slice(&scaled);
+        }
+        appraisal.hear(exec, &weights.appraisal, features, levels, sensitivity);
+        let (features, shares) = (features.len() / BLOCK_FRAMES, appraisal.shares().len() / BLOCK_FRAMES);
+        for (t, told) in told.chunks_exact_mut(features + shares).enumerate() {
+            told[..features].copy_from_slice(&self.features[t * features..][..features]);
+            told[features..].copy_from_slice(&appraisal.shares()[t * shares..][..shares]);
         }
     }
 
@@ -131,7 +168,7 @@ impl Hearing {
 
     /// Its sound vector, `[S]`, with the agent's root at its end.
     pub fn vector(&mut self, root: &Root, sensitivity: f32) -> &[f32] {
-        let rest = &mut self.vector[self.features.len() + 2 * BLOCK_FRAMES..];
+        let rest = &mut self.vector[self.told + 2 * BLOCK_FRAMES..];
         let place = self.sources.salient().map_or([0.0; 5], |place| {
             let local = root.to_local(Vec3::from(place.map(|v| v as f32)));
             let [x, z] = [local.x, local.z].map(f64::from);

@@ -8,14 +8,16 @@
 //!
 //! Samples are pascals as they are 1 m from the source: RMS 1 is 94 dB SPL.
 
+mod appraisal;
 mod head;
 mod input;
 mod listener;
 mod sources;
 mod stats;
 
+pub use appraisal::AppraisalWeights;
 pub use input::SoundInput;
-pub use listener::Hearing;
+pub use listener::{Hearing, HearingWeights};
 pub use stats::SoundStats;
 
 #[cfg(test)]

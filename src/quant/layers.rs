@@ -45,14 +45,14 @@ const LARGE: usize = 150_000;
 ///
 /// - The flow's input projection and its latent embedding are multiplied with each other when a
 ///   bundle is loaded: f16 at most.
-/// - The audio encoders' features condition everything that follows. Its three largest convolutions
+/// - The audio encoders' features, and what is made of them, condition everything that follows. Its three largest convolutions
 ///   are int8 in int8 and int4 bundles, its other layers f16 and int8.
 /// - The last layers of flow and decoder are int8 in int4 bundles. They are small and nothing evens
 ///   their errors out: measured on the base model, the decoder's alone was two thirds of the joint
 ///   error.
 pub fn default_scheme(name: &str, elements: usize, scheme: Scheme) -> Scheme {
     let folded = name.ends_with(".input") || name.ends_with(".embed_latent");
-    let audio = name.starts_with("audio.") || name.starts_with("hearing.");
+    let audio = ["audio.", "hearing.", "appraisal."].iter().any(|prefix| name.starts_with(prefix));
     let last = name.ends_with(".final.out") || name == "vae.decoder.out";
     match scheme {
         Scheme::I8 | Scheme::I4 if folded => Scheme::F16,

@@ -44,7 +44,7 @@ impl Block<'_> {
     pub(super) fn listening(&mut self) -> [Listening<'_>; LISTENERS] {
         let BlockState { inputs, frames, head, block, .. } = &mut *self.state;
         // The frames are those of the block before.
-        inputs.listening(*block, std::array::from_fn(|i| frames[i].global[*head]))
+        inputs.listening(*block, std::array::from_fn(|i| frames[i].global[*head]), self.options.sensitivity)
     }
 
     /// Its generator of latents, if it has one.

@@ -176,8 +176,9 @@ impl EncodedVoice {
 pub(super) enum Listening<'a> {
     /// A voice.
     Voice(u64, &'a mut EncodedVoice),
-    /// The agent's ears, to the block before, in whose frames the head joint was there.
-    Room(u64, &'a mut Hearing, [Transform; BLOCK_FRAMES]),
+    /// The agent's ears, to the block before, in whose frames the head joint was there, and the
+    /// sensitivity.
+    Room(u64, &'a mut Hearing, [Transform; BLOCK_FRAMES], f32),
     /// Nobody.
     Nobody,
 }
@@ -187,7 +188,7 @@ impl Listening<'_> {
     fn hears(&self) -> bool {
         match self {
             Self::Voice(block, voice) => voice.voice.is_present() && voice.known(*block).is_some(),
-            Self::Room(block, hearing, _) => hearing.has_begun(*block),
+            Self::Room(block, hearing, ..) => hearing.has_begun(*block),
             Self::Nobody => false,
         }
     }
@@ -195,9 +196,9 @@ impl Listening<'_> {
     fn listen(&mut self, exec: &mut Exec, engine: &Engine) {
         match self {
             Self::Voice(block, voice) => voice.heard = voice.listen(exec, engine, *block),
-            Self::Room(block, hearing, heads) => {
+            Self::Room(block, hearing, heads, sensitivity) => {
                 if let Some(weights) = &engine.hearing {
-                    hearing.listen(exec, weights, *block, heads);
+                    hearing.listen(exec, weights, *block, heads, *sensitivity);
                 }
             }
             Self::Nobody => {}
@@ -307,10 +308,15 @@ impl Inputs {
     }
 
     /// What is to [`listen`] for `block`; the head joint was at `heads` in the frames before it.
-    pub(super) fn listening(&mut self, block: u64, heads: [Transform; BLOCK_FRAMES]) -> [Listening<'_>; LISTENERS] {
+    pub(super) fn listening(
+        &mut self,
+        block: u64,
+        heads: [Transform; BLOCK_FRAMES],
+        sensitivity: f32,
+    ) -> [Listening<'_>; LISTENERS] {
         let known = self.user.known(block);
         let room = match (&mut self.hearing, known) {
-            (Some(hearing), Some(known)) => Listening::Room(known, hearing, heads),
+            (Some(hearing), Some(known)) => Listening::Room(known, hearing, heads, sensitivity),
             _ => Listening::Nobody,
         };
         [Listening::Voice(block, &mut self.agent), Listening::Voice(block, &mut self.user), room]

@@ -8,6 +8,7 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import save_file
 
+from .nets.appraisal import Appraisal
 from .nets.audio import AudioEncoder
 from .nets.flow import FlowNet
 from .nets.vae import Vae
@@ -72,6 +73,7 @@ class Bundle:
     flow: FlowNet
     student: FlowNet | None
     hearing: AudioEncoder | None   # what is heard in the room
+    appraisal: Appraisal | None        # which reaction that calls for
 
     def stat(self, name):
         return self.tensors[f"stats.{name}"].float()
@@ -105,8 +107,13 @@ class Bundle:
 def flow_from(config, latent, audio_features, hearing=None):
     """The network of a `flow` section; `hearing`: that section of the bundle, if it has one."""
     keys = ("layers", "width", "heads", "mlp", "tau_width", "window_blocks", "embed_latent", "embed_user", "embed_voice", "embed_gaze", "user_scale")
-    sound = {"sound_features": hearing["audio"]["features"], "embed_sound": hearing["embed"]} if hearing else {}
+    sound = {"sound_features": sound_features(hearing), "embed_sound": hearing["embed"]} if hearing else {}
     return FlowNet(latent, audio_features, **{k: config[k] for k in keys}, **sound)
+
+
+def sound_features(hearing):
+    """Features of a frame that a flow is told of the room by a `hearing` section, or None: the encoder's, and the shares of reactions behind them."""
+    return hearing["audio"]["features"] + len(hearing["appraisal"]["reactions"]) if hearing else 0
 
 
 def encoder_from(config):
@@ -137,6 +144,12 @@ def dequantised(tensors):
     return out
 
 
+def room_config(encoder, appraisal, flow):
+    """A `hearing` section."""
+    return {"audio": audio_config(encoder.spec, encoder.out.out_features), "embed": flow.embed_sound["2"].out_features,
+            "appraisal": {"width": appraisal.width, "reactions": list(appraisal.reactions)}}
+
+
 def read(path):
     """Opens a bundle (f32, f16 or int8) and builds its networks in fp32."""
     with safe_open(path, framework="pt") as f:
@@ -154,7 +167,8 @@ def read(path):
         load_net("vae", vae_from(config["vae"], features), tensors),
         load_net("flow", net(), tensors),
         load_net("student", net(), tensors) if config.get("student") else None,
-        load_net("hearing", encoder_from(hearing["audio"]), tensors) if hearing else None)
+        load_net("hearing", encoder_from(hearing["audio"]), tensors) if hearing else None,
+        Appraisal(hearing["audio"]["features"], **hearing["appraisal"]).fill(tensors) if hearing else None)
 
 
 def make_config(rig, audio_layers, audio_features, vae, flow, *, name, description, licence, student=None, radius=0.1, session=None, hearing=None):

@@ -19,12 +19,14 @@ def split(b):
     flow = {"size": {k: v for k, v in b.config["flow"].items()}, "latent": b.config["vae"]["latent"], "audio": width}
     both = lambda net: {"net": net.state_dict(), "ema": net.state_dict()}
     if b.hearing is not None:
-        flow["sound"] = b.config["hearing"]["audio"]["features"]
+        flow["sound"] = bundles.sound_features(b.config["hearing"])
     out = {"audio": both(b.audio) | {"spec": b.audio.spec, "features": width},
            "vae": both(b.vae) | {"size": dict(b.config["vae"]), "mean": b.stat("pose_mean"), "std": b.stat("pose_std")},
            "flow": both(b.flow) | flow | latents}
     if b.hearing is not None:
-        out["hearing"] = both(b.hearing) | {"spec": b.hearing.spec, "features": flow["sound"]}
+        out["hearing"] = both(b.hearing) | {"spec": b.hearing.spec, "features": b.hearing.out.out_features}
+        a = b.appraisal
+        out["appraisal"] = both(a) | {"features": b.hearing.out.out_features, "reactions": list(a.reactions), "width": a.width}
     if b.student is not None:
         out["student"] = both(b.student) | flow | latents | b.config["student"]
     return out

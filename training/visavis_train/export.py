@@ -12,6 +12,7 @@ import numpy as np
 import torch
 
 from . import bundle, credits
+from .hearing import appraise
 from .motion import rig
 from .train.cache import load_audio, load_vae
 from .train.data import clips, expand, load_motion
@@ -51,8 +52,9 @@ def idle_clip(corpus, split, n, limit=80, known=None):
     return best[1], best[2]
 
 
-def assemble(audio, vae_path, flow_path, student_path, idle, name, licence, session=None, hearing=None):
-    """Tensors and configuration of a bundle. `hearing`: the encoder of what is heard in the room, of networks that hear it."""
+def assemble(audio, vae_path, flow_path, student_path, idle, name, licence, session=None, hearing=None, appraisal=None):
+    """Tensors and configuration of a bundle. `hearing`, `appraisal`: the encoder of what is heard in the room and what is made of it, of networks that
+    hear it."""
     vae, mean, std, vae_state = load_vae(vae_path)
     flow, state = load_flow(flow_path)
     tensors = {"stats.pose_mean": mean, "stats.pose_std": std, "stats.latent_mean": state["latent_mean"], "stats.latent_std": state["latent_std"],
@@ -66,7 +68,8 @@ def assemble(audio, vae_path, flow_path, student_path, idle, name, licence, sess
     room = None
     if hearing is not None:
         nets.append(("hearing", hearing))
-        room = {"audio": bundle.audio_config(hearing.spec, hearing.out.out_features), "embed": flow.embed_sound["2"].out_features}
+        tensors |= appraisal.tensors()
+        room = bundle.room_config(hearing, appraisal, flow)
     for prefix, net in nets:
         tensors |= bundle.net_tensors(prefix, net)
     rig_json = bundle.rig_config(rig.NAMES, rig.PARENTS, rig.OFFSETS, rig.EYES, rig.HEAD_BACK)
@@ -81,6 +84,7 @@ def main():
         parser.add_argument(f"--{name}", required=True)
     parser.add_argument("--student")
     parser.add_argument("--hearing", help="encoder of what is heard in the room (`hearing.encoder`), of a flow that was trained with it")
+    parser.add_argument("--appraisal", help="which reaction that calls for (`hearing.appraise`), of a flow that was trained with it")
     parser.add_argument("--data", help="folder whose sounds/esc10/ATTRIBUTION.tsv names the makers of sounds, where a corpus has such")
     parser.add_argument("--sources", nargs="*", default=[], metavar="CORPUS", help="further corpora whose recordings are to be acknowledged")
     parser.add_argument("--name", default="base")
@@ -90,6 +94,8 @@ def main():
     for name in ("guidance", "gaze-guidance", "temperature"):
         parser.add_argument(f"--{name}", type=float, help="default of sessions")
     args = parser.parse_args()
+    if (args.hearing is None) != (args.appraisal is None):
+        raise SystemExit("--hearing and --appraisal belong together")
     if args.idle_frames % 4:
         raise SystemExit("--idle-frames must be a multiple of 4")
     if args.idle_from:
@@ -102,7 +108,7 @@ def main():
     tensors, config = assemble(load_audio(args.audio), args.vae, args.flow, args.student, idle, args.name,
                                credits.licence(args.corpus, *args.sources, data=args.data),
                                {k: v for k in ("guidance", "gaze_guidance", "temperature") if (v := getattr(args, k)) is not None},
-                               load_audio(args.hearing) if args.hearing else None)
+                               load_audio(args.hearing) if args.hearing else None, appraise.load(args.appraisal) if args.appraisal else None)
     bundle.write(args.out, tensors, config, half=args.half, narrow=NARROW)
     print(f"{args.out}: {os.path.getsize(args.out) / 1e6:.1f} MB")
 

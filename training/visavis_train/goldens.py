@@ -65,7 +65,7 @@ class Session:
         reference = Reference(net, settings["guidance"], settings["gaze_guidance"], clean)
         self.idle = b.encode(b.idle()[None])
         self.b, self.sounds, self.sound, self.heard = b, sounds, [], []
-        self.width = b.config["hearing"]["audio"]["features"] if b.hearing else 0
+        self.width = bundles.sound_features(b.config.get("hearing"))
         none = absent(1, m, b.config["audio"]["features"], sound_features=self.width)
         reference.push(self.idle, eps_idle[None], branches(none, True))
         root = torch.zeros(1, 3, dtype=torch.float64)
@@ -105,8 +105,9 @@ class Session:
             self.middle, self.left = ears.centre(positions[1:], rig.quat_to_mat(quats[1:]))
             self.ears = ears.hear([s for s in self.sounds if s.first < 4 * k], self.middle, self.left)
             features = torch.zeros(4 * k, self.width)
-            features[first:] = ears.listen(self.b.hearing, ears.squashed(self.ears.ears)[800 * first:])
-            self.features = features
+            heard = ears.listen(self.b.hearing, ears.squashed(self.ears.ears)[800 * first:])
+            features[first:] = self.b.appraisal.behind(heard, torch.tensor(self.ears.levels[first:], dtype=torch.float32), SENSITIVITY)
+            self.features = features[:, :self.b.hearing.out.out_features]
             last, f32 = slice(4 * k - 4, 4 * k), lambda a: torch.tensor(a, dtype=torch.float32)
             sound = ears.vector(features[None, last], f32(self.ears.levels[None, last]), f32(self.ears.place[None, 4 * k - 1]),
                                 f32(self.ears.known[None, 4 * k - 1]), root, torch.tensor([SENSITIVITY]))[None]

@@ -9,6 +9,7 @@ import torch
 
 from . import bundle
 from .motion import features, rig
+from .nets.appraisal import Appraisal
 from .nets.audio import AudioEncoder
 
 AUDIO = [(1, 4, 10, 5, False), (4, 8, 10, 5, False), (8, 8, 8, 4, False), (8, 8, 8, 4, False), (8, 8, 4, 2, False), (8, 8, 3, 1, True)]
@@ -65,9 +66,10 @@ def build(seed=1, hearing=False):
         tensors |= bundle.net_tensors(prefix, net)
     heard = {}
     if hearing:
-        room = {"audio": bundle.audio_config(AUDIO, 6), "embed": 8}
+        appraisal = lively(Appraisal(6, ("stay", "look", "run"), 16), 1.6)
+        room = {"audio": bundle.audio_config(AUDIO, 6), "embed": 8, "appraisal": {"width": appraisal.width, "reactions": list(appraisal.reactions)}}
         hearing = lively(AudioEncoder(AUDIO, 6), 1.6)
-        tensors |= bundle.net_tensors("hearing", hearing)
+        tensors |= bundle.net_tensors("hearing", hearing) | appraisal.tensors()
         for prefix, net in (("flow", flow), ("student", student)):
             full = lively(bundle.flow_from(FLOW, latent, 8, room))
             tensors |= {k: v for k, v in bundle.net_tensors(prefix, full).items() if "_sound" in k}

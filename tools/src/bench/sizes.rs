@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use visavis::internals::bundle::Tensors;
 use visavis::internals::config::{
-    AudioConfig, Config, ConvConfig, FORMAT, FlowConfig, HearingConfig, Kind, PoseConfig, SessionConfig, StudentConfig,
-    VaeConfig,
+    AppraisalConfig, AudioConfig, Config, ConvConfig, FORMAT, FlowConfig, HearingConfig, Kind, PoseConfig,
+    SessionConfig, StudentConfig, VaeConfig,
 };
 use visavis::internals::kernels::{Kernels, Scheme};
 use visavis::{Engine, Error, ErrorKind, Joint, Networks, Result, Rig};
@@ -57,7 +57,8 @@ impl Size {
     /// As [`Size::engine`].
     pub fn engine_with_hearing(self, scheme: Scheme, kernels: Kernels, networks: Networks) -> Result<Arc<Engine>> {
         let shapes = [(10, 5), (10, 5), (8, 4), (8, 4), (4, 2), (3, 1)];
-        let hearing = HearingConfig { audio: encoder(&shapes, &HEARING, 24), embed: 64 };
+        let appraisal = AppraisalConfig { width: 48, reactions: (0..7).map(|i| i.to_string()).collect() };
+        let hearing = HearingConfig { audio: encoder(&shapes, &HEARING, 24), embed: 64, appraisal };
         let config = Config { hearing: Some(hearing), ..self.config() };
         Engine::from_tensors(config, &Tensors::seeded(scheme), kernels, networks)
     }

@@ -12,7 +12,7 @@ import numpy as np
 import torch
 
 from ..corpus import measures, store
-from ..hearing import ears
+from ..hearing import appraise, ears
 from ..motion import rig
 from ..nets.audio import AudioEncoder
 from ..nets.vae import Vae
@@ -80,22 +80,28 @@ def features(audio, clip, frames):
 
 
 @torch.no_grad()
-def rooms(clips, encoder, gaze):
+def rooms(clips, encoder, appraisal, gaze):
     """What was heard in the room in each clip: features [N, D_s] f16, levels [N, 2], source [N, 3], known [N], where the body reacts [N], sensitivity
-    [clips], features of silence [D_s]; and the gaze score [N], its mean elsewhere in the clip while the body reacts: a target is for conversation."""
+    [clips], features of silence [D_s]. With an `appraisal` its shares of reactions are behind the features; and the gaze score [N], its mean elsewhere in the clip while the body reacts: a target is for conversation."""
     frames, told = [], gaze.clone()
     sensitivity = torch.zeros(len(clips))
     for i, path in enumerate(clips.paths):
         with np.load(path.replace(".safetensors", ".npz")) as kept:
             wave = torch.from_numpy(kept["wave"]).float() / 32767
-            frames.append([ears.listen(encoder, wave).half()] + [torch.from_numpy(kept[k]) for k in ("levels", "place", "known", "reacts")])
+            sound, rest = ears.listen(encoder, wave), [torch.from_numpy(kept[k]) for k in ("levels", "place", "known", "reacts")]
+            if appraisal is not None:
+                sound = appraisal.behind(sound, rest[0], kept["sensitivity"])
+            frames.append([sound.half()] + rest)
             part, reacts = slice(int(clips.starts[i]), int(clips.starts[i + 1])), frames[-1][-1]
             sensitivity[i] = float(kept["sensitivity"])
         if (~reacts).any():
             told[part] = torch.where(reacts, gaze[part][~reacts].mean(), gaze[part])
     sound, levels, source, known, reacts = (torch.cat(x) for x in zip(*frames))
+    silence = ears.listen(encoder, torch.zeros(8 * ears.FRAME))
+    if appraisal is not None:
+        silence = appraisal.behind(silence, torch.full((8, 2), ears.SILENT), 0.0)
     return {"sound": sound, "levels": levels, "source": source, "known": known, "reacts": reacts, "sensitivity": sensitivity, "hears": torch.ones(len(clips), dtype=torch.bool),
-            "silence": ears.listen(encoder, torch.zeros(8 * ears.FRAME))[-1], "gaze": told}
+            "silence": silence[-1], "gaze": told}
 
 
 def join(caches, split):
@@ -166,6 +172,7 @@ def main():
     parser.add_argument("--corpus")
     parser.add_argument("--join", nargs="+", metavar="CACHE", help="caches to make one of, instead of a corpus")
     parser.add_argument("--hearing", help="encoder of what is heard in the room (`hearing.encoder`), for a corpus with sounds")
+    parser.add_argument("--appraisal", help="what says which reaction that calls for (`hearing.appraise`), with --hearing")
     parser.add_argument("--vae", help="needed without --latents-of")
     parser.add_argument("--audio", help="needed without --features-of")
     parser.add_argument("--out", required=True)
@@ -209,7 +216,7 @@ def main():
         if team.leads:
             shared = {name: getattr(clips, name).clone() for name in ("roots", "user", "gaze")}
             if args.hearing:
-                shared |= rooms(clips, load_audio(args.hearing), shared["gaze"])
+                shared |= rooms(clips, load_audio(args.hearing), args.appraisal and appraise.load(args.appraisal), shared["gaze"])
             common.save(os.path.join(args.out, split + ".pt"), names=clips.names, starts=clips.starts, has=clips.has, still=still(clips), **shared, **state)
             print(f"{split}: {len(clips)} clips, {int(clips.starts[-1]) / 108000:.2f} hours", flush=True)
     team.close()

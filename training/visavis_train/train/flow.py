@@ -92,6 +92,16 @@ def load_flow(path, device="cpu"):
     return net.eval().to(device), state
 
 
+def widened(weights, before, after):
+    """Weights of a network that hears `before` features, for one that hears `after`: what is new counts for nothing at first."""
+    name = "embed_sound.0.weight"
+    if not before or before == after:
+        return weights
+    frames, rest = weights[name].split([4 * before, weights[name].shape[1] - 4 * before], 1)
+    frames = torch.nn.functional.pad(frames.unflatten(1, (4, before)), (0, after - before)).flatten(1)
+    return weights | {name: torch.cat([frames, rest], 1)}
+
+
 @torch.no_grad()
 def error_factor(path, cache, device="cpu", tau=0.8, batches=4):
     """Matrix that turns white noise into noise like the flow's x1 errors at `tau`, in latents as the encoder gives them [Dz, Dz]."""
@@ -162,8 +172,9 @@ def main():
     size, latent = first["size"] if first else SIZES[args.size]["flow"], train.z.shape[1]
     net = FlowNet(latent, train.audio_features, **size, sound_features=train.sound_features).to(device)
     if first:
-        learns = [] if first.get("sound", 0) == train.sound_features else [k for k in net.state_dict() if "_sound." in k]
-        if net.load_state_dict(first["net"], strict=False).missing_keys != learns:
+        learns = [] if first.get("sound", 0) else [k for k in net.state_dict() if "_sound." in k]
+        weights = widened(first["net"], first.get("sound", 0), train.sound_features)
+        if net.load_state_dict(weights, strict=False).missing_keys != learns:
             raise SystemExit(f"{args.out if args.resume else args.init} has other sizes than this network")
         metric = first["metric"].to(device) if args.resume else metric
     spoken = {"spec": audio.spec, "features": train.audio_features} if audio else {}

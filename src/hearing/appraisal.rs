@@ -1,0 +1,134 @@
+//! What the agent makes of what it hears: which reaction it calls for, frame by frame.
+//!
+//! h = gelu(W x + b) of a frame's features, both levels and the sensitivity; a layer of LSTM cells;
+//! shares of the reactions = softmax(V c + d).
+
+use crate::bundle::Tensors;
+use crate::config::{AppraisalConfig, HearingConfig};
+use crate::error::Result;
+use crate::frame::BLOCK_FRAMES;
+use crate::kernels::{Epilogue, Exec, Kernels, Matrix};
+
+/// What a frame has beside features: two levels and the sensitivity.
+const BESIDE: usize = 3;
+
+/// The network's weights.
+#[derive(Debug)]
+pub struct AppraisalWeights {
+    into: Matrix,
+    cells: Matrix,
+    out: Matrix,
+}
+
+impl AppraisalWeights {
+    /// Reads `appraisal.into`, `appraisal.lstm` (`[4 width, 2 width]`: gates i, f, g, o on input
+    /// and hidden row) and `appraisal.out`.
+    ///
+    /// # Errors
+    /// As [`Tensors::linear`].
+    pub fn load(t: &Tensors<'_>, kernels: Kernels, config: &HearingConfig) -> Result<Self> {
+        let AppraisalConfig { width: w, reactions } = &config.appraisal;
+        Ok(Self {
+            into: t.linear(kernels, "appraisal.into", *w, &[config.audio.features + BESIDE])?,
+            cells: t.linear(kernels, "appraisal.lstm", 4 * w, &[2 * w])?,
+            out: t.linear(kernels, "appraisal.out", reactions.len(), &[*w])?,
+        })
+    }
+
+    /// Bytes of the packed matrices.
+    pub fn bytes(&self) -> usize {
+        [&self.into, &self.cells, &self.out].map(Matrix::bytes).into_iter().sum()
+    }
+
+    /// The widest row of an operation.
+    pub fn width(config: &HearingConfig) -> usize {
+        let AppraisalConfig { width, reactions } = &config.appraisal;
+        (4 * width).max(reactions.len()).max(config.audio.features + BESIDE)
+    }
+}
+
+/// One session's: what it remembers, and scratch.
+#[derive(Debug)]
+pub(super) struct Appraisal {
+    /// `[4, features + 3]`.
+    rows: Vec<f32>,
+    /// `[4, width]`.
+    h: Vec<f32>,
+    /// Input and hidden row, `[2 width]`.
+    pair: Vec<f32>,
+    gates: Vec<f32>,
+    cell: Vec<f32>,
+    hidden: Vec<f32>,
+    /// `[4, reactions]`.
+    shares: Vec<f32>,
+}
+
+impl Appraisal {
+    /// One that has heard nothing.
+    pub(super) fn new(config: &HearingConfig) -> Self {
+        let AppraisalConfig { width, reactions } = &config.appraisal;
+        let (width, reactions, inputs) = (*width, reactions.len(), config.audio.features + BESIDE);
+        let zeros = |n| vec![0.0; n];
+        Self {
+            rows: zeros(BLOCK_FRAMES * inputs),
+            h: zeros(BLOCK_FRAMES * width),
+            pair: zeros(2 * width),
+            gates: zeros(4 * width),
+            cell: zeros(width),
+            hidden: zeros(width),
+            shares: zeros(BLOCK_FRAMES * reactions),
+        }
+    }
+
+    /// Forgets what was heard.
+    pub(super) fn forget(&mut self) {
+        self.cell.fill(0.0);
+        self.hidden.fill(0.0);
+    }
+
+    /// Appraises a block: features `[4, features]`, levels `[4, 2]`, sensitivity.
+    pub(super) fn hear(
+        &mut self,
+        exec: &mut Exec,
+        weights: &AppraisalWeights,
+        features: &[f32],
+        levels: &[f32],
+        sensitivity: f32,
+    ) {
+        let Self { rows, h, pair, gates, cell, hidden, shares } = self;
+        let (inputs, width) = (rows.len() / BLOCK_FRAMES, cell.len());
+        let frames = features.chunks_exact(inputs - BESIDE).zip(levels.chunks_exact(2));
+        for (row, (features, levels)) in rows.chunks_exact_mut(inputs).zip(frames) {
+            let (first, rest) = row.split_at_mut(features.len());
+            first.copy_from_slice(features);
+            rest[..2].copy_from_slice(levels);
+            rest[2] = sensitivity;
+        }
+        exec.linear(&weights.into, rows, BLOCK_FRAMES, h, Epilogue::Gelu);
+        for h in h.chunks_exact_mut(width) {
+            pair[..width].copy_from_slice(h);
+            pair[width..].copy_from_slice(hidden);
+            exec.linear(&weights.cells, pair, 1, gates, Epilogue::Store);
+            exec.lstm(gates, cell, hidden);
+            h.copy_from_slice(hidden);
+        }
+        exec.linear(&weights.out, h, BLOCK_FRAMES, shares, Epilogue::Store);
+        let reactions = shares.len() / BLOCK_FRAMES;
+        shares.chunks_exact_mut(reactions).for_each(softmax);
+    }
+
+    /// Shares of the reactions in the frames that were appraised last, `[4, reactions]`.
+    pub(super) fn shares(&self) -> &[f32] {
+        &self.shares
+    }
+}
+
+fn softmax(row: &mut [f32]) {
+    let top = row.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let mut sum = 0.0;
+    for v in row.iter_mut() {
+        *v = libm::expf(*v - top);
+        sum += *v;
+    }
+    row.iter_mut().for_each(|v| *v /= sum);
+}
