@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{HEARING, Inputs, hearing, hearing_in, motion_of, noise, poll_blocks, run, tiny};
+use common::{HEARING, Inputs, TOLD, hearing, hearing_in, motion_of, noise, poll_blocks, run, tiny};
 use glam::Vec3;
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -38,19 +38,19 @@ impl Stages {
 
     /// Levels of four frames at the left and the right ear.
     fn levels(&self, block: usize) -> [[f32; 2]; 4] {
-        let at = 4 * HEARING.0;
+        let at = 4 * TOLD;
         let levels = &self.vector(block).expect("something is heard")[at..at + 8];
         std::array::from_fn(|t| [levels[2 * t], levels[2 * t + 1]])
     }
 
     /// Known, sine, cosine, distance, height.
     fn place(&self, block: usize) -> [f32; 5] {
-        let at = 4 * HEARING.0 + 8;
+        let at = 4 * TOLD + 8;
         self.vector(block).expect("something is heard")[at..at + 5].try_into().expect("five values")
     }
 
     fn is_known(&self, block: usize) -> bool {
-        self.vector(block).is_some_and(|vector| vector[4 * HEARING.0 + 8] == 1.0)
+        self.vector(block).is_some_and(|vector| vector[4 * TOLD + 8] == 1.0)
     }
 }
 
@@ -241,7 +241,13 @@ fn what_is_heard_is_what_two_ears_would_hear() {
         encoder.encode(&mut exec, &weights, &mixed, &mut features);
         let error = common::max_error(&features, &stages.0[&(block as u64, "hearing.features")]);
         assert!(error < 1e-4, "block {block}: {error}");
-        assert_eq!(stages.vector(block).unwrap()[..4 * HEARING.0], stages.0[&(block as u64, "hearing.features")]);
+        let told = stages.vector(block).unwrap()[..4 * TOLD].chunks_exact(TOLD);
+        for (told, features) in told.zip(stages.0[&(block as u64, "hearing.features")].chunks_exact(HEARING.0)) {
+            let (first, shares) = told.split_at(HEARING.0);
+            assert_eq!(first, features);
+            let sum: f32 = shares.iter().sum();
+            assert!(shares.iter().all(|share| (0.0..1.0).contains(share)) && (sum - 1.0).abs() < 1e-6, "{shares:?}");
+        }
 
         // The first of the largest, by the order in which they began, in the last frame in which
         // one was loud enough.

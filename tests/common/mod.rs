@@ -185,6 +185,10 @@ pub fn block_seconds(blocks: usize) -> f64 {
 
 /// Features of the hearing of [`hearing_bytes`], and the width of its embedding.
 pub const HEARING: (usize, usize) = (6, 8);
+/// Width and reactions of its appraisal.
+pub const APPRAISAL: (usize, usize) = (8, 3);
+/// What a frame of its sound vector has: features and shares of the reactions.
+pub const TOLD: usize = HEARING.0 + APPRAISAL.1;
 
 /// The tiny bundle with hearing of random weights; all else is the tiny bundle's.
 pub fn hearing_bytes() -> Vec<u8> {
@@ -223,7 +227,11 @@ fn with_hearing(bytes: &[u8]) -> Vec<u8> {
             serde_json::json!({"inputs": inputs, "outputs": outputs, "kernel": kernel, "stride": stride, "residual": *stride == 1})
         })
         .collect();
-    config["hearing"] = serde_json::json!({"audio": {"layers": layers, "features": features}, "embed": embed});
+    let (cells, reactions) = APPRAISAL;
+    let names: Vec<_> = (0..reactions).map(|i| format!("reaction {i}")).collect();
+    let appraisal = serde_json::json!({"width": cells, "reactions": names});
+    config["hearing"] = serde_json::json!(
+        {"audio": {"layers": layers, "features": features}, "embed": embed, "appraisal": appraisal});
     metadata.insert("visavis".to_owned(), config.to_string());
     let width = config["flow"]["width"].as_u64().expect("a width") as usize;
 
@@ -238,8 +246,11 @@ fn with_hearing(bytes: &[u8]) -> Vec<u8> {
         layer(format!("hearing.conv.{i}"), vec![outputs, kernel, inputs], true);
     }
     layer("hearing.out".to_owned(), vec![features, 8], true);
+    layer("appraisal.into".to_owned(), vec![cells, features + 3], true);
+    layer("appraisal.lstm".to_owned(), vec![4 * cells, 2 * cells], true);
+    layer("appraisal.out".to_owned(), vec![reactions, cells], true);
     for net in ["flow", "student"] {
-        layer(format!("{net}.embed_sound.0"), vec![embed, 4 * features + 14], true);
+        layer(format!("{net}.embed_sound.0"), vec![embed, 4 * TOLD + 14], true);
         layer(format!("{net}.embed_sound.2"), vec![embed, embed], true);
         layer(format!("{net}.input_sound"), vec![width, embed + 1], false);
     }
