@@ -1,6 +1,7 @@
 """Hearing: ears that move with the head, sound vectors, networks with and without sounds, interrupted conversations, their windows."""
 import json
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,9 +15,11 @@ from visavis_train.corpus import plausible, simulate, store
 from visavis_train.hearing import corpus, ears
 from visavis_train.hearing.events import Event, Room
 from visavis_train.mospa.react import REACTIONS
+from visavis_train.nets.appraisal import Appraisal
 from visavis_train.nets.audio import AudioEncoder
 from visavis_train.nets.flow import Condition, FlowNet, absent, sound_width
 from visavis_train.train import cache, common, windows
+from visavis_train.train.flow import widened
 
 GOLDENS = os.path.join(os.path.dirname(__file__), "..", "..", "tests", "goldens")
 SMALL = [(1, 4, 10, 5, False), (4, 8, 10, 5, False), (8, 8, 8, 4, False), (8, 8, 8, 4, False), (8, 8, 4, 2, False)]
@@ -73,10 +76,12 @@ def test_a_sound_vector_tells_the_bearing_from_where_the_agent_stands():
     assert torch.isfinite(here).all()
 
 
+SIZE = dict(layers=1, width=32, heads=4, mlp=2, tau_width=16, window_blocks=6, embed_latent=16, embed_user=8, embed_voice=8, embed_gaze=4)
+
+
 def nets():
     torch.manual_seed(0)
-    size = dict(layers=1, width=32, heads=4, mlp=2, tau_width=16, window_blocks=6, embed_latent=16, embed_user=8, embed_voice=8, embed_gaze=4)
-    plain, hearing = FlowNet(8, 4, **size), FlowNet(8, 4, **size, sound_features=3, embed_sound=8)
+    plain, hearing = FlowNet(8, 4, **SIZE), FlowNet(8, 4, **SIZE, sound_features=3, embed_sound=8)
     hearing.load_state_dict(plain.state_dict(), strict=False)
     torch.nn.init.normal_(hearing.input_sound.weight)
     return plain, hearing
@@ -94,6 +99,29 @@ def test_without_sounds_a_network_computes_what_it_did_and_with_them_something_e
     assert torch.equal(got[:, :3], want[:, :3]) and (got[:, 3:] - want[:, 3:]).abs().max() > 1e-3
     assert torch.equal(hearing(z, tau, sound.dropped()), plain(z, tau, cond.dropped())) and sound.dropped(3).heard is sound.heard
     assert absent(2, 3, 4, sound_features=3).heard.shape == (2, 3, 1) and absent(2, 3, 4).sound is None
+
+
+def test_an_appraisal_keeps_its_weights_in_a_bundle_and_stands_behind_the_features():
+    torch.manual_seed(4)
+    net, other = (Appraisal(6, ("stay", "run"), 8) for _ in range(2))
+    features, levels = torch.randn(9, 6), torch.randn(9, 2)
+    told = net.behind(features, levels, 0.5)
+    assert told.shape == (9, 8) and torch.equal(told[:, :6], features) and torch.allclose(told[:, 6:].sum(1), torch.ones(9))
+    assert torch.allclose(net.behind(features[:5], levels[:5], 0.5), told[:5]), "what comes does not change what was"
+    assert not torch.allclose(net.behind(features, levels, -1.0), told)
+    assert torch.allclose(other.fill(net.tensors()).behind(features, levels, 0.5), told, atol=1e-6)
+
+
+def test_a_network_that_is_told_more_computes_what_it_did_until_it_has_learnt_more():
+    _, before = nets()
+    after = FlowNet(8, 4, **SIZE, sound_features=5, embed_sound=8)
+    after.load_state_dict(widened(before.state_dict(), 3, 5))
+    z, tau, cond = torch.randn(2, 5, 8), torch.full((2, 1), 0.5), absent(2, 5, 4, sound_features=3)
+    cond.heard += 1
+    few = torch.randn(2, 5, sound_width(3))
+    more = torch.cat([torch.cat([few[..., :12].unflatten(-1, (4, 3)), torch.randn(2, 5, 4, 2)], -1).flatten(-2), few[..., 12:]], -1)
+    want = before(z, tau, replace(cond, sound=few))
+    assert torch.allclose(after(z, tau, replace(cond, sound=more)), want, atol=1e-6)
 
 
 def test_the_tiny_bundle_hears_what_the_goldens_say():

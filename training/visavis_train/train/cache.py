@@ -80,7 +80,7 @@ def features(audio, clip, frames):
 
 
 @torch.no_grad()
-def rooms(clips, encoder, appraisal, gaze):
+def rooms(clips, encoder, gaze, appraisal=None):
     """What was heard in the room in each clip: features [N, D_s] f16, levels [N, 2], source [N, 3], known [N], where the body reacts [N], sensitivity
     [clips], features of silence [D_s]. With an `appraisal` its shares of reactions are behind the features; and the gaze score [N], its mean elsewhere in the clip while the body reacts: a target is for conversation."""
     frames, told = [], gaze.clone()
@@ -216,7 +216,7 @@ def main():
         if team.leads:
             shared = {name: getattr(clips, name).clone() for name in ("roots", "user", "gaze")}
             if args.hearing:
-                shared |= rooms(clips, load_audio(args.hearing), args.appraisal and appraise.load(args.appraisal), shared["gaze"])
+                shared |= rooms(clips, load_audio(args.hearing), shared["gaze"], args.appraisal and appraise.load(args.appraisal))
             common.save(os.path.join(args.out, split + ".pt"), names=clips.names, starts=clips.starts, has=clips.has, still=still(clips), **shared, **state)
             print(f"{split}: {len(clips)} clips, {int(clips.starts[-1]) / 108000:.2f} hours", flush=True)
     team.close()
