@@ -8,9 +8,11 @@
 //!
 //! Samples are pascals as they are 1 m from the source: RMS 1 is 94 dB SPL.
 
+mod brought;
 mod head;
 mod input;
 mod listener;
+mod locate;
 mod sources;
 mod stats;
 
