@@ -10,9 +10,8 @@
 //! let go: nobody waits, and what one thread pushes stays in order.
 
 use super::feed::{Command, Feed};
-use super::line::Line;
+use super::line::{Input, Line};
 use super::resample::{Resampler, check_rate};
-use super::stream::Input;
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::SAMPLE_RATE;
 use crate::queue::Queue;

@@ -39,6 +39,15 @@ pub struct Line {
     pub(super) counts: Counts,
 }
 
+/// An end that sound is pushed into.
+pub trait Input {
+    /// Where what was pushed waits.
+    fn line(&self) -> &Line;
+
+    /// Absent and empty. Waits for a push that is under way.
+    fn reset(&self);
+}
+
 /// What writers count, as in [`VoiceStats`].
 #[derive(Default)]
 pub(super) struct Counts {

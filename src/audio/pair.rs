@@ -5,9 +5,8 @@
 //! two threads that push the same ears at once have no order between them.
 
 use super::input::{PIECE, check_finite};
-use super::line::Line;
+use super::line::{Input, Line};
 use super::resample::{Resampler, check_rate};
-use super::stream::Input;
 use crate::error::{Error, ErrorKind, Result};
 use std::sync::atomic::Ordering::{AcqRel, Relaxed, Release, SeqCst};
 use std::sync::atomic::{AtomicBool, fence};

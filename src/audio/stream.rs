@@ -1,17 +1,8 @@
 //! The end of pushed sound that is heard: one stream, read in order by one thread.
 
 use super::input::VoiceInput;
-use super::line::{Glimpse, Line, VoiceStats};
+use super::line::{Glimpse, Input, VoiceStats};
 use super::pair::PairInput;
-
-/// An end that sound is pushed into.
-pub trait Input {
-    /// Where what was pushed waits.
-    fn line(&self) -> &Line;
-
-    /// Absent and empty. Waits for a push that is under way.
-    fn reset(&self);
-}
 
 /// A bounded stream of 24 kHz samples that any thread pushes into ([`Stream::input`]) and one
 /// reads. One of a [`PairInput`] has two samples, left and right, where it says one.

@@ -151,13 +151,14 @@ impl Brought {
         self.course[t] = self.salience;
     }
 
+    /// Four frames in which nothing is heard: what was, is where it was.
     fn fade(&mut self) {
-        for (course, place) in self.course.iter_mut().zip(&mut self.places) {
+        self.places = [self.places[BLOCK_FRAMES - 1]; BLOCK_FRAMES];
+        for course in &mut self.course {
             self.salience -= self.rules.fade;
-            self.since = self.since.saturating_add(1);
-            // Where it was, is known of the last frame that was heard.
-            (*course, *place) = (self.salience, None);
+            *course = self.salience;
         }
+        self.since = self.since.saturating_add(BLOCK_FRAMES as u32);
     }
 
     /// Lets `block` go by unheard.

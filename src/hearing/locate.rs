@@ -14,7 +14,7 @@
 use super::head::{Head, ears_at};
 use crate::audio::fft::{Complex, Fft};
 use crate::audio::head::BEND;
-use crate::frame::{FRAME_SAMPLES, SAMPLE_RATE};
+use crate::frame::FRAME_SAMPLES;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::OnceLock;
 
@@ -32,9 +32,9 @@ const ANGLES: usize = 37;
 const AZIMUTHS: usize = 72;
 /// Heights of directions over the horizon, radians, and how likely they are before anything is
 /// heard: what sounds is mostly lower than a head.
-const HEIGHTS: [(f64, f64); 3] = [(-0.61, -0.5), (-0.17, 0.0), (0.61, -1.5)];
+const HEIGHTS: [(f64, f64); 3] = [(-0.61, -8.0), (-0.17, 0.0), (0.61, -10.0)];
 const DIRECTIONS: usize = AZIMUTHS * HEIGHTS.len();
-/// Share of a frequency's power that rings on a window later: 60 dB in 0.5 s.
+/// Share of a frequency's power that rings on a window later: 60 dB in 0.7 s.
 const RINGING: f64 = 0.85;
 /// Exponent of power by which a frequency that is weaker than the window's strongest weighs less.
 const EVEN: f64 = 0.15;
@@ -43,7 +43,7 @@ const EVEN: f64 = 0.15;
 const SHADE: f64 = 0.1;
 const SHADE_MOST: f64 = 1.5;
 /// Log-likelihood of a frequency whose phase is right.
-const TRUST: f64 = 0.3;
+const TRUST: f64 = 0.05;
 /// Share of what earlier frames said that is left a frame later.
 const KEPT: f64 = 0.97;
 /// What is left of it where a louder sound begins.
@@ -154,12 +154,13 @@ impl Locator {
         }
         let said = self.compare(&tallies);
         let mut most = f64::NEG_INFINITY;
-        for (belief, direction) in self.belief.iter_mut().zip(&self.tables.directions) {
+        for (d, (belief, direction)) in self.belief.iter_mut().zip(&self.tables.directions).enumerate() {
             let [left, _] = head.sides(*direction);
             let at = (libm::asin(left.clamp(-1.0, 1.0)) + FRAC_PI_2) / (PI) * (ANGLES - 1) as f64;
             let i = (at as usize).min(ANGLES - 2);
             let part = at - i as f64;
-            *belief = KEPT * *belief + said[i] + part * (said[i + 1] - said[i]);
+            let expected = (1.0 - KEPT) * HEIGHTS[d % HEIGHTS.len()].1;
+            *belief = KEPT * *belief + expected + said[i] + part * (said[i + 1] - said[i]);
             most = most.max(*belief);
         }
         self.belief.iter_mut().for_each(|belief| *belief = (*belief - most).max(LEAST));
