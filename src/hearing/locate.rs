@@ -30,8 +30,8 @@ const BINS: usize = 86;
 const ANGLES: usize = 37;
 /// Azimuths of the world, counterclockwise seen from below: 0 is +Z, a quarter of them +X.
 const AZIMUTHS: usize = 72;
-/// Heights of directions over the horizon, radians, and how likely they are before anything is
-/// heard: what sounds is mostly lower than a head.
+/// Heights of directions over the horizon, radians, and how likely they are: what sounds is mostly
+/// about as high as a head, or lower. A still head takes what is low for what is more ahead.
 const HEIGHTS: [(f64, f64); 3] = [(-0.61, -8.0), (-0.17, 0.0), (0.61, -10.0)];
 const DIRECTIONS: usize = AZIMUTHS * HEIGHTS.len();
 /// Share of a frequency's power that rings on a window later: 60 dB in 0.7 s.
@@ -43,15 +43,16 @@ const EVEN: f64 = 0.15;
 const SHADE: f64 = 0.1;
 const SHADE_MOST: f64 = 1.5;
 /// Log-likelihood of a frequency whose phase is right.
-const TRUST: f64 = 0.05;
+const TRUST: f64 = 0.1;
 /// Share of what earlier frames said that is left a frame later.
 const KEPT: f64 = 0.97;
 /// What is left of it where a louder sound begins.
 const KEPT_ANEW: f64 = 0.25;
 /// The least that frames may have said of a direction.
 const LEAST: f64 = -40.0;
-/// By how much the direction behind the head is less likely before anything is heard.
-const BEHIND: f64 = 8.0;
+/// By how much the direction behind the head is less likely before anything is heard. Those before
+/// the face are alike, so that little evidence does not draw to the middle.
+const BEHIND: f64 = 4.0;
 
 /// Finds the direction of what two ears hear. Allocates when made and never after.
 pub(super) struct Locator {
@@ -147,7 +148,7 @@ impl Locator {
         if !std::mem::replace(&mut self.knows, true) {
             for (i, (belief, direction)) in self.belief.iter_mut().zip(&self.tables.directions).enumerate() {
                 let [_, front] = head.sides(*direction);
-                *belief = HEIGHTS[i % HEIGHTS.len()].1 - 0.5 * BEHIND * (1.0 - front);
+                *belief = HEIGHTS[i % HEIGHTS.len()].1 + BEHIND * front.min(0.0);
             }
         } else if anew {
             self.belief.iter_mut().for_each(|belief| *belief *= KEPT_ANEW);
