@@ -36,9 +36,9 @@ pub fn run(args: &LocateArgs) -> Result<()> {
 /// The yaw at a time, degrees: in a straight line from row to row.
 fn yaw_at(turns: &[(f64, f64)], time: f64) -> f64 {
     let after = turns.partition_point(|(t, _)| *t <= time);
-    match (after.checked_sub(1).map(|i| turns[i]), turns.get(after)) {
+    match (after.checked_sub(1).map(|i| turns[i]), turns.get(after).copied()) {
         (Some((t, yaw)), Some((next, then))) => yaw + (time - t) / (next - t) * (then - yaw),
-        (Some((_, yaw)), None) | (None, Some((_, yaw))) => yaw.to_owned(),
+        (Some((_, yaw)), None) | (None, Some((_, yaw))) => yaw,
         (None, None) => 0.0,
     }
 }
