@@ -502,6 +502,166 @@ fn one_more_than_sixteen_is_heard_if_it_is_louder() {
     assert!(stages.0.values().flatten().all(|v| v.is_finite()));
 }
 
+/// What an ear hears of noise, and the other one `later` samples later.
+fn pair(samples: usize, later: usize, loud: f32) -> [Vec<f32>; 2] {
+    let sound = noise(5, samples + later, loud);
+    [sound[later..].to_vec(), sound[..samples].to_vec()]
+}
+
+/// The sine of the angle to the left of the plane between the agent's ears of a place.
+fn to_the_left(session: &Session, frame: &Frame, place: Vec3) -> f32 {
+    let head = frame.global[session.engine().rig().index("head").unwrap()];
+    (head.rotation * Vec3::X).dot((place - head.position).with_y(0.0).normalize())
+}
+
+#[test]
+fn ears_are_heard_and_say_from_where() {
+    for swapped in [false, true] {
+        let mut session = session(&hearing());
+        let mut stages = Stages::default();
+        assert_eq!(session.heard_place(), None);
+        let mut ears = pair(8 * BLOCK_SAMPLES, 9, 0.3);
+        if swapped {
+            ears.reverse();
+        }
+        session.push_ears(&ears[0], &ears[1], RATE).unwrap();
+        let mut last = block(&mut session, &mut stages);
+        for i in 1..8 {
+            let next = block(&mut session, &mut stages);
+            let place = session.heard_place().expect("it stands out");
+            let left = to_the_left(&session, &last[3], place);
+            assert!(if swapped { left < -0.3 } else { left > 0.3 }, "block {i}: {left}");
+            assert!(is_at(&stages, i, &last, place), "{place:?}, {:?}", stages.place(i));
+            let level = stages.levels(i);
+            assert!(level.as_flattened().iter().all(|level| (level - 1.0).abs() < 0.5), "{level:?}");
+            last = next;
+        }
+        // A louder source stands out, then louder ears.
+        let place = Vec3::new(0.5, 1.2, -1.0);
+        session.push_sound(1, &noise(1, 4 * BLOCK_SAMPLES, 9.0), RATE, place).unwrap();
+        (0..3).for_each(|_| drop(block(&mut session, &mut stages)));
+        assert_eq!(session.heard_place(), Some(place));
+        session.push_ears(&vec![50.0; BLOCK_SAMPLES], &vec![50.0; BLOCK_SAMPLES], RATE).unwrap();
+        (0..3).for_each(|_| drop(block(&mut session, &mut stages)));
+        assert!(session.heard_place().is_some_and(|other| other != place && other.y == 1.5));
+        assert_eq!(session.stats().inputs.sounds.started, 3);
+        session.reset().unwrap();
+        assert_eq!((session.heard_place(), session.stats().inputs.sounds), (None, Default::default()));
+    }
+}
+
+#[test]
+fn how_ears_are_brought_does_not_change_a_bit() {
+    let engine = hearing();
+    let deaf = poll_blocks(&mut session(&tiny()), BLOCKS);
+    for rate in [RATE, 44_100, 8_000, 192_000] {
+        let [left, right] = pair(2 * rate as usize, 5, 0.3);
+        let play = |piece: usize, threads: usize| {
+            let options = SessionOptions { threads, ..Default::default() };
+            let mut session = engine.session(options).unwrap();
+            let mut frames = poll_blocks(&mut session, 4);
+            for (left, right) in left.chunks(piece).zip(right.chunks(piece)) {
+                session.push_ears(left, right, rate).unwrap();
+            }
+            session.push_ears(&[], &[], rate).unwrap();
+            frames.extend(poll_blocks(&mut session, BLOCKS - 4));
+            frames
+        };
+        let whole = play(left.len(), 1);
+        assert_eq!(whole[..20], deaf[..20], "as without hearing, until then");
+        assert_ne!(whole[20..], deaf[20..]);
+        assert!(play(977, 1) == whole && play(64, 2) == whole, "{rate} Hz");
+    }
+}
+
+#[test]
+fn ears_that_are_pushed_as_they_hear_have_no_gaps() {
+    for rate in [RATE, 48_000] {
+        let mut session = session(&hearing());
+        let mut stages = Stages::default();
+        let a_block = BLOCK_SAMPLES * (rate / RATE) as usize;
+        let tone: Vec<f32> = (0..30 * a_block).map(|i| 0.3 * libm::sinf(0.1 * i as f32)).collect();
+        for (i, piece) in tone.chunks(a_block).enumerate() {
+            session.push_ears(piece, piece, rate).unwrap();
+            block(&mut session, &mut stages);
+            if i > 2 {
+                let levels = stages.levels(i);
+                assert!(levels.as_flattened().iter().all(|l| (l - levels[0][0]).abs() < 0.3), "{rate}: {levels:?}");
+            }
+        }
+        assert_eq!(session.stats().inputs.sounds.started, 1, "{rate}");
+    }
+}
+
+#[test]
+fn whatever_ears_bring_is_bounded_typed_and_counted() {
+    let mut session = session(&hearing());
+    let mut stages = Stages::default();
+    let kind = |result: visavis::Result<()>| result.unwrap_err().kind();
+    assert_eq!(kind(session.push_ears(&[0.1; 10], &[0.1; 9], RATE)), ErrorKind::Argument);
+    assert_eq!(kind(session.push_ears(&[0.1; 10], &[], RATE)), ErrorKind::Argument);
+    assert_eq!(kind(session.push_ears(&[0.1; 10], &[0.1; 10], 7_999)), ErrorKind::Audio);
+    assert_eq!(kind(session.push_ears(&[0.1; 10], &[0.1; 10], 192_001)), ErrorKind::Audio);
+    session.end_ears().unwrap();
+    block(&mut session, &mut stages);
+    assert!(session.stats().inputs.sounds.started == 0 && stages.0.is_empty(), "nothing was taken");
+    let [mut left, right] = pair(4_800, 3, 0.5);
+    (left[7], left[9], left[11]) = (f32::NAN, f32::NEG_INFINITY, 1e9);
+    assert_eq!(kind(session.push_ears(&left, &right, RATE)), ErrorKind::Audio);
+    (0..3).for_each(|_| drop(block(&mut session, &mut stages)));
+    assert!(stages.levels(2)[0][1] > 0.5, "the rest was taken: {:?}", stages.levels(2));
+    let stats = session.stats().inputs.sounds;
+    assert_eq!((stats.pieces, stats.started, stats.bad_rate_samples), (1, 1, 40));
+    assert_eq!((stats.non_finite_samples, stats.clipped_samples), (2, 1));
+    // Eleven seconds at once: ten are kept, of both.
+    let long = vec![0.2; 11 * RATE as usize];
+    session.push_ears(&long, &long, RATE).unwrap();
+    assert_eq!(session.stats().inputs.sounds.overflow_samples, 2 * u64::from(RATE));
+    block(&mut session, &mut stages);
+    session.end_ears().unwrap();
+    (0..3).for_each(|_| drop(block(&mut session, &mut stages)));
+    let last = *stages.0.keys().map(|(block, _)| block).max().unwrap() as usize;
+    assert!(stages.levels(last).as_flattened().iter().all(|level| *level < -1.7), "nothing is left");
+    for value in [64.0, -1e30, f32::MIN_POSITIVE, 1e-40] {
+        session.push_ears(&[value; 9_000], &[-value; 9_000], RATE).unwrap();
+        for _ in 0..4 {
+            let frames = block(&mut session, &mut stages);
+            assert!(frames.iter().all(|f| f.global.iter().all(|t| t.position.is_finite() && t.rotation.is_finite())));
+        }
+    }
+    assert!(stages.0.values().flatten().all(|v| v.is_finite()));
+    assert_eq!(kind(tiny().session(SessionOptions::default()).unwrap().push_ears(&[], &[], RATE)), ErrorKind::Argument);
+}
+
+#[test]
+fn left_and_right_stay_together_whoever_pushes() {
+    let mut session = session(&hearing());
+    let mut stages = Stages::default();
+    let ear = noise(3, 40_000, 0.4);
+    std::thread::scope(|scope| {
+        for rate in [RATE, 48_000] {
+            let (input, ear) = (session.sounds(), &ear);
+            scope.spawn(move || {
+                for round in 0..60 {
+                    ear.chunks(331).for_each(|piece| input.push_ears(piece, piece, rate).unwrap());
+                    if round % 3 == 0 {
+                        input.end_ears().unwrap();
+                    }
+                    std::thread::yield_now();
+                }
+            });
+        }
+        (0..60).for_each(|_| drop(block(&mut session, &mut stages)));
+    });
+    // The same samples in both: whatever was dropped, their levels are one.
+    let vectors: Vec<_> =
+        stages.0.keys().filter(|key| key.1 == "conditioning.sound").map(|key| key.0 as usize).collect();
+    assert!(!vectors.is_empty());
+    for i in vectors {
+        assert!(stages.levels(i).iter().all(|[left, right]| left == right), "block {i}: {:?}", stages.levels(i));
+    }
+}
+
 #[test]
 fn blocks_that_are_held_hear_nothing_and_those_after_them_do() {
     let engine = hearing();

@@ -225,7 +225,7 @@ fn a_running_session_does_not_allocate() {
 }
 
 /// Sixteen sounds at once, some of a rate that is resampled, sources that come and go, a
-/// seventeenth, ends, alone and in a team: after each slot has had a sound of each rate, neither
+/// seventeenth, ends, and a host's ears, alone and in a team: after each slot has had a sound of each rate, neither
 /// pushing nor computing allocates.
 fn hearing_does_not_allocate() {
     let sound: Vec<f32> = (0..6_400).map(|i| 0.3 * (i as f32 * 0.05).sin()).collect();
@@ -242,6 +242,10 @@ fn hearing_does_not_allocate() {
                 }
                 if block % 9 == 8 {
                     session.end_sound(block % 16).unwrap();
+                    session.end_ears().unwrap();
+                }
+                if ids > 0 {
+                    session.push_ears(&sound, &sound, 48_000).unwrap();
                 }
                 // For a while there are none, and some end.
                 let now = session.next_due();

@@ -124,6 +124,7 @@ fn blocks_of(engine: &std::sync::Arc<Engine>) {
             heard.push(id, &[0.2; 24_000], 24_000, place).unwrap();
             heard.push(id, &[0.2; 4_800], 48_000, place).unwrap();
         }
+        heard.push_ears(&[0.2; 480], &[0.1; 480], 48_000).unwrap();
     }
     let (voice, head, controls) = (session.voice_input(Speaker::User), session.head_input(), session.controls());
     let sound = [0.1; 480];
@@ -138,6 +139,7 @@ fn blocks_of(engine: &std::sync::Arc<Engine>) {
             }
             if heard.is_heard() {
                 all &= heard.push(i as u32 % 20, &sound, 24_000, place).is_ok() && heard.end(30 + i as u32).is_ok();
+                all &= heard.push_ears(&sound, &sound, 48_000).is_ok() && (i % 7 > 0 || heard.end_ears().is_ok());
             }
             all &= controls.set_gaze((i % 2 > 0).then_some(0.5)).is_ok();
             all &= controls.set_sampler([Sampler::Single, Sampler::Midpoint4][i % 2]).is_ok();

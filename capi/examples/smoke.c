@@ -260,6 +260,8 @@ static void sounds(const visavis_engine *deaf, const char *path) {
     REFUSED(ARGUMENT, visavis_session_push_sound(session, 1, sound, 960, 48000, 0, 1, 2));
     CHECK(strstr(visavis_last_error(), "hearing") != NULL);
     REFUSED(ARGUMENT, visavis_session_end_sound(session, 1));
+    REFUSED(ARGUMENT, visavis_session_push_ears(session, sound, sound, 960, 48000));
+    REFUSED(ARGUMENT, visavis_session_end_ears(session));
     OK(visavis_session_set_sensitivity(session, 1));
     visavis_session_free(session);
 
@@ -280,6 +282,18 @@ static void sounds(const visavis_engine *deaf, const char *path) {
     REFUSED(AUDIO, visavis_session_push_sound(session, 1, sound, 960, 0, 0, 1, 2));
     REFUSED(ARGUMENT, visavis_session_push_sound(session, 1, NULL, 960, 48000, 0, 1, 2));
     REFUSED(ARGUMENT, visavis_session_push_sound(NULL, 1, sound, 960, 48000, 0, 1, 2));
+    REFUSED(AUDIO, visavis_session_push_ears(session, sound, sound, 960, 0));
+    REFUSED(ARGUMENT, visavis_session_push_ears(session, sound, NULL, 960, 48000));
+    REFUSED(ARGUMENT, visavis_session_push_ears(NULL, sound, sound, 960, 48000));
+    OK(visavis_session_push_ears(session, sound, sound, 960, 48000));
+    OK(visavis_session_end_ears(session));
+    OK(visavis_session_push_ears(session, NULL, NULL, 0, 48000));
+    float place[3];
+    int32_t known = -1;
+    OK(visavis_session_heard_place(session, place, &known));
+    CHECK(known == 0);
+    REFUSED(ARGUMENT, visavis_session_heard_place(session, NULL, &known));
+    REFUSED(ARGUMENT, visavis_session_heard_place(session, place, NULL));
     sound[3] = NAN;
     sound[4] = -65;
     REFUSED(AUDIO, visavis_session_push_sound(session, 1, sound, 960, 48000, 0, 1, 2));
@@ -293,9 +307,11 @@ static void sounds(const visavis_engine *deaf, const char *path) {
     uint32_t count;
     for (int k = 0; k < 3; k++) OK(visavis_session_poll(session, 1, frames, sizeof *frames, NULL, 0, &count));
     CHECK(isfinite(frames[3].hips[1]));
+    OK(visavis_session_heard_place(session, place, &known));
+    CHECK(known == 1 && place[0] == 0 && place[1] == 1.6f && place[2] == 0);
     visavis_stats stats = {.struct_size = sizeof stats};
     OK(visavis_session_stats(session, &stats));
-    CHECK(stats.sound_bad_places == 2 && stats.sound_bad_rate_samples == 960 && stats.sound_non_finite_samples == 1);
+    CHECK(stats.sound_bad_places == 2 && stats.sound_bad_rate_samples == 3 * 960 && stats.sound_non_finite_samples == 1);
     CHECK(stats.sound_clipped_samples == 1 && stats.sound_refused >= 84);
     visavis_session_free(session);
 }

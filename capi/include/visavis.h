@@ -499,6 +499,28 @@ visavis_status visavis_session_push_sound(struct visavis_session *session,
 // Since interface 1.3.
 visavis_status visavis_session_end_sound(struct visavis_session *session, uint32_t id);
 
+// Pushes a piece of what two microphones at the agent's ears hear, pascals: `count` samples of each,
+// of `rate` Hz (8000 to 192000). For hosts that do not know where sounds are: the direction is
+// estimated, as the agent's head turns; distance and height are not.
+//
+// The first piece, and the first after they ran dry, is heard from the start of the next block on;
+// further pieces follow without a gap, up to ten seconds ahead (more is dropped and counted). No
+// samples change nothing.
+//
+// VISAVIS_STATUS_ARGUMENT where the bundle has no hearing; VISAVIS_STATUS_AUDIO for a rate out of
+// range, of which nothing is taken, and for samples that are not finite, in whose place there is
+// silence. From any thread, one at a time: what comes from another meanwhile is dropped and
+// counted. Since interface 1.3.
+visavis_status visavis_session_push_ears(struct visavis_session *session,
+                                         const float *left,
+                                         const float *right,
+                                         size_t count,
+                                         uint32_t rate);
+
+// Ends what visavis_session_push_ears brought at once: what no block has heard of it is dropped.
+// VISAVIS_STATUS_ARGUMENT where the bundle has no hearing. From any thread. Since interface 1.3.
+visavis_status visavis_session_end_ears(struct visavis_session *session);
+
 // Sets how much the agent minds sounds in the room from the next block on: -1 dull, 0 neutral, 1
 // sensitive, numbers between and up to 1.5 either way. Since interface 1.3.
 visavis_status visavis_session_set_sensitivity(struct visavis_session *session, float sensitivity);
@@ -557,6 +579,12 @@ visavis_status visavis_session_dyadic(const struct visavis_session *session,
                                       float *shares,
                                       size_t capacity,
                                       size_t *count);
+
+// Where the last block took what stands out among the sounds to be, into `position[3]`, world
+// metres: the place of a source, or the direction that was estimated of what
+// visavis_session_push_ears brought, 2 m away and 1.5 m over the floor. `*known` becomes 1, or 0
+// and the position stays as it was, while nothing is known. Since interface 1.3.
+visavis_status visavis_session_heard_place(const struct visavis_session *session, float *position, int32_t *known);
 
 // Session time at which the next block is due, seconds, into `time`.
 visavis_status visavis_session_next_due(const struct visavis_session *session, double *time);

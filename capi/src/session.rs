@@ -267,6 +267,43 @@ pub unsafe extern "C" fn visavis_session_end_sound(session: *mut VisavisSession,
     unsafe { around(session, |shared| Ok(shared.sounds().end(id)?)) }
 }
 
+/// Pushes a piece of what two microphones at the agent's ears hear, pascals: `count` samples of each,
+/// of `rate` Hz (8000 to 192000). For hosts that do not know where sounds are: the direction is
+/// estimated, as the agent's head turns; distance and height are not.
+///
+/// The first piece, and the first after they ran dry, is heard from the start of the next block on;
+/// further pieces follow without a gap, up to ten seconds ahead (more is dropped and counted). No
+/// samples change nothing.
+///
+/// VISAVIS_STATUS_ARGUMENT where the bundle has no hearing; VISAVIS_STATUS_AUDIO for a rate out of
+/// range, of which nothing is taken, and for samples that are not finite, in whose place there is
+/// silence. From any thread, one at a time: what comes from another meanwhile is dropped and
+/// counted. Since interface 1.3.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_push_ears(
+    session: *mut VisavisSession,
+    left: *const f32,
+    right: *const f32,
+    count: usize,
+    rate: u32,
+) -> VisavisStatus {
+    let push = |shared: &SharedSession| {
+        // SAFETY: the header's promise, twice.
+        let (left, right) = unsafe { (slice(left, count, "left")?, slice(right, count, "right")?) };
+        Ok(shared.sounds().push_ears(left, right, rate)?)
+    };
+    // SAFETY: the header's promise.
+    unsafe { around(session, push) }
+}
+
+/// Ends what visavis_session_push_ears brought at once: what no block has heard of it is dropped.
+/// VISAVIS_STATUS_ARGUMENT where the bundle has no hearing. From any thread. Since interface 1.3.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_end_ears(session: *mut VisavisSession) -> VisavisStatus {
+    // SAFETY: the header's promise.
+    unsafe { around(session, |shared| Ok(shared.sounds().end_ears()?)) }
+}
+
 /// Sets how much the agent minds sounds in the room from the next block on: -1 dull, 0 neutral, 1
 /// sensitive, numbers between and up to 1.5 either way. Since interface 1.3.
 #[unsafe(no_mangle)]
@@ -420,6 +457,30 @@ pub unsafe extern "C" fn visavis_session_dyadic(
         let made = s.frames().into_iter().flatten().flat_map(|frame| &frame.dyadic);
         shares.iter_mut().zip(made).for_each(|(to, share)| _ = to.write(*share));
         *count = all;
+        Ok(())
+    };
+    // SAFETY: the header's promise.
+    unsafe { with(session, read) }
+}
+
+/// Where the last block took what stands out among the sounds to be, into `position[3]`, world
+/// metres: the place of a source, or the direction that was estimated of what
+/// visavis_session_push_ears brought, 2 m away and 1.5 m over the floor. `*known` becomes 1, or 0
+/// and the position stays as it was, while nothing is known. Since interface 1.3.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_session_heard_place(
+    session: *const VisavisSession,
+    position: *mut f32,
+    known: *mut i32,
+) -> VisavisStatus {
+    let read = |s: &mut Session| {
+        // SAFETY: the header's promise, twice.
+        let (position, known) = unsafe { (room(position, 3, "position")?, place(known, "known")?) };
+        let heard = s.heard_place();
+        if let Some(heard) = heard {
+            position.iter_mut().zip(heard.to_array()).for_each(|(to, v)| _ = to.write(v));
+        }
+        known.write(i32::from(heard.is_some()));
         Ok(())
     };
     // SAFETY: the header's promise.

@@ -52,6 +52,8 @@ fn pushing_allocates_nothing_after_the_first() {
                 visavis_session_clear_audio(session, 1),
                 visavis_session_push_sound(session, 7, sound.as_ptr(), i, 48_000, 1.0, 1.0, -2.0),
                 visavis_session_end_sound(session, 8),
+                visavis_session_push_ears(session, sound.as_ptr(), sound.as_ptr(), i, 48_000),
+                visavis_session_end_ears(session),
                 visavis_session_set_sensitivity(session, 1.0),
                 visavis_session_set_gaze(session, 0.5),
                 visavis_session_set_sampler(session, VisavisSamplerKind::Midpoint as i32, 1),

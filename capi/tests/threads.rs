@@ -45,6 +45,8 @@ fn two_push_from_one_buffer_while_a_third_polls() {
                             visavis_session_push_sound(session, 1 + thread as u32, buffer, 960, 48_000, 1.0, 1.0, -2.0),
                             visavis_session_push_sound(session, 100 + i as u32, buffer, 96, 24_000, 0.0, 1.0, 9.0),
                             visavis_session_end_sound(session, 2 - thread as u32),
+                            visavis_session_push_ears(session, buffer, buffer, 960, 48_000),
+                            visavis_session_end_ears(session),
                             visavis_session_set_sensitivity(session, 1.0 - thread as f32),
                             visavis_session_set_natural_gaze(session),
                             visavis_session_set_guidance(session, 1.3, 2.0),

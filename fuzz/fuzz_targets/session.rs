@@ -62,6 +62,11 @@ enum Step {
     /// The same of a rate that is allowed, within some metres.
     GoodSource(u8, u16, u8, [i8; 3]),
     EndSource(u8),
+    /// A host's ears: lengths, rate, values.
+    Ears([u16; 2], u32, [f32; 2]),
+    /// The same of one length and a rate that is allowed.
+    GoodEars(u16, u8),
+    EndEars,
     Sensitivity(f32),
     /// Settings by the way of other threads.
     Elsewhere(Option<f32>, f32, u8),
@@ -197,6 +202,18 @@ fn take(session: &mut Session, step: Step, next: &mut Option<u64>) -> u32 {
             let hears = session.sounds().is_heard();
             assert_eq!(session.end_sound(u32::from(id)).is_ok(), hears, "a source or none");
         }
+        Step::Ears(lengths, rate, values) => {
+            let ears = [0, 1].map(|side| vec![values[side]; usize::from(lengths[side]) % 4096]);
+            typed(session.push_ears(&ears[0], &ears[1], rate));
+        }
+        Step::GoodEars(len, i) => {
+            let rate = [24_000, 48_000, 8_000, 192_000][usize::from(i.saturating_sub(250)) % 4];
+            sound.iter_mut().enumerate().for_each(|(i, s)| *s = 60.0 * (i as f32 * 0.1).sin());
+            let samples = &sound[..usize::from(len) % sound.len()];
+            let hears = session.sounds().is_heard();
+            assert_eq!(session.push_ears(samples, samples, rate).is_ok(), hears, "good ears");
+        }
+        Step::EndEars => assert_eq!(session.end_ears().is_ok(), session.sounds().is_heard(), "ears or none"),
         Step::Sensitivity(sensitivity) => typed(session.set_sensitivity(sensitivity)),
         Step::Head(p, time) => typed(session.push_user_head(Vec3::from(p), time)),
         Step::GoodHead(p, later) => {

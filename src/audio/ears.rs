@@ -4,7 +4,7 @@
 //! Samples are pascals at 24 kHz, within +-1: RMS 1 is 94 dB SPL. The head's centre is 1.6 m
 //! above the origin, it faces +Z, the left ear is at +X.
 
-use super::features::{Complex, Fft};
+use super::fft::{Complex, Fft};
 use super::head::{self, NEAREST, SPEED, around, brightness};
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::SAMPLE_RATE;

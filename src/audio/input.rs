@@ -10,7 +10,7 @@
 //! let go: nobody waits, and what one thread pushes stays in order.
 
 use super::feed::{Command, Feed};
-use super::line::Line;
+use super::line::{Input, Line};
 use super::resample::{Resampler, check_rate};
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::SAMPLE_RATE;
@@ -20,12 +20,21 @@ use std::sync::atomic::fence;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
 /// Samples that are handled at once.
-const PIECE: usize = 256;
+pub(super) const PIECE: usize = 256;
 /// Words of a record of the inbox: what it is, and two samples a word.
 const WORDS: usize = 1 + PIECE / 2;
 /// Records of the inbox that are kept for commands: sound that is too much is dropped before any
 /// command is.
 const COMMANDS: usize = 32;
+
+/// Tells of samples that were not finite.
+pub(super) fn check_finite(bad: usize, samples: usize) -> Result<()> {
+    if bad == 0 {
+        return Ok(());
+    }
+    let message = format!("{bad} of {samples} pushed samples are not finite numbers; silence is in their place");
+    Err(Error::new(ErrorKind::Audio, message))
+}
 
 /// One of the two who talk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -82,10 +91,6 @@ impl VoiceInput {
         Self { shared: Arc::new(Shared { line, inbox, feed: Mutex::default(), clip }) }
     }
 
-    pub(super) fn line(&self) -> &Line {
-        &self.shared.line
-    }
-
     /// Appends mono `samples` (full scale 1.0) of `rate` Hz (8000 to 192000) and makes the voice
     /// present. An empty push changes nothing.
     ///
@@ -110,13 +115,7 @@ impl VoiceInput {
         let mut bad = 0;
         let mut clean = [0.0; PIECE];
         let mut pieces = samples.chunks(PIECE).map(|piece| {
-            let not_finite = piece.iter().filter(|s| !s.is_finite()).count();
-            let clipped =
-                piece.iter().filter(|s| s.abs() > *clip).count() - piece.iter().filter(|s| s.is_infinite()).count();
-            bad += not_finite;
-            line.counts.clipped.fetch_add(clipped as u64, Relaxed);
-            let cleaned = |s: &f32| if s.is_finite() { s.clamp(-clip, *clip) } else { 0.0 };
-            clean.iter_mut().zip(piece).for_each(|(to, s)| *to = cleaned(s));
+            bad += line.clean(piece, *clip, &mut clean);
             (clean, piece.len())
         });
         let mut done = Ok(());
@@ -135,13 +134,7 @@ impl VoiceInput {
             }
         }
         self.sweep();
-        if bad == 0 {
-            return done;
-        }
-        line.counts.non_finite.fetch_add(bad as u64, Relaxed);
-        let message =
-            format!("{bad} of {} pushed samples are not finite numbers; silence is in their place", samples.len());
-        Err(Error::new(ErrorKind::Audio, message))
+        check_finite(bad, samples.len()).and(done)
     }
 
     /// Makes what converts sound of `rate` Hz, so that the first push of that rate does not
@@ -221,9 +214,14 @@ impl VoiceInput {
             }
         }
     }
+}
 
-    /// Absent and empty. Waits for a push that is under way.
-    pub(super) fn reset(&self) {
+impl Input for VoiceInput {
+    fn line(&self) -> &Line {
+        &self.shared.line
+    }
+
+    fn reset(&self) {
         let mut feed = self.shared.feed.lock().unwrap_or_else(PoisonError::into_inner);
         while self.shared.inbox.pop(&mut [0; WORDS]) {}
         *feed = Feed::default();

@@ -28,7 +28,7 @@ pub struct VoiceStats {
 ///
 /// That room may be filled while the reader is still copying out of it. So a reader asks
 /// [`Line::is_cut`] after the copy and forgets what it copied if the line was cleared meanwhile.
-pub(super) struct Line {
+pub struct Line {
     /// Bits of floats.
     samples: Box<[AtomicU32]>,
     written: AtomicU64,
@@ -37,6 +37,15 @@ pub(super) struct Line {
     present: AtomicBool,
     lag: AtomicUsize,
     pub(super) counts: Counts,
+}
+
+/// An end that sound is pushed into.
+pub trait Input {
+    /// Where what was pushed waits.
+    fn line(&self) -> &Line;
+
+    /// Absent and empty. Waits for a push that is under way.
+    fn reset(&self);
 }
 
 /// What writers count, as in [`VoiceStats`].
@@ -76,6 +85,18 @@ impl Line {
         let from = (at % self.samples.len() as u64) as usize;
         let first = count.min(self.samples.len() - from);
         [&self.samples[from..from + first], &self.samples[..count - first]]
+    }
+
+    /// Copies `piece` to the start of `clean`, within `clip`, silence for what is not finite;
+    /// counts both and returns how many of the latter there were.
+    pub(super) fn clean(&self, piece: &[f32], clip: f32, clean: &mut [f32]) -> usize {
+        let bad = piece.iter().filter(|s| !s.is_finite()).count();
+        let clipped = piece.iter().filter(|s| s.is_finite() && s.abs() > clip).count();
+        self.counts.clipped.fetch_add(clipped as u64, Relaxed);
+        self.counts.non_finite.fetch_add(bad as u64, Relaxed);
+        let cleaned = |s: &f32| if s.is_finite() { s.clamp(-clip, clip) } else { 0.0 };
+        clean.iter_mut().zip(piece).for_each(|(to, s)| *to = cleaned(s));
+        bad
     }
 
     /// Appends what fits, and counts the rest. For the one writer, as all that follows up to

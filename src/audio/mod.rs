@@ -15,9 +15,11 @@ mod encoder;
 #[cfg(feature = "internals")]
 pub mod features;
 mod feed;
+pub mod fft;
 pub mod head;
 mod input;
 mod line;
+mod pair;
 mod resample;
 mod stream;
 #[cfg(feature = "tract")]
@@ -28,6 +30,7 @@ mod weights;
 pub use encoder::AudioEncoder;
 pub use input::{Speaker, VoiceInput};
 pub use line::VoiceStats;
+pub use pair::PairInput;
 #[cfg(feature = "internals")]
 pub use resample::resample_to_24k;
 pub use resample::{MAX_RATE, MIN_RATE, Resampler, check_rate};

@@ -1,27 +1,38 @@
 //! The end of pushed sound that is heard: one stream, read in order by one thread.
 
 use super::input::VoiceInput;
-use super::line::{Glimpse, VoiceStats};
+use super::line::{Glimpse, Input, VoiceStats};
+use super::pair::PairInput;
 
 /// A bounded stream of 24 kHz samples that any thread pushes into ([`Stream::input`]) and one
-/// reads.
-pub struct Stream {
-    input: VoiceInput,
+/// reads. One of a [`PairInput`] has two samples, left and right, where it says one.
+pub struct Stream<I = VoiceInput> {
+    input: I,
     /// What [`Stream::look`] found.
     seen: Glimpse,
     /// Number of the next sample.
     at: u64,
 }
 
-impl Stream {
+impl Stream<VoiceInput> {
     /// A stream that holds `samples` of 24 kHz; what is louder than `clip` is clipped. `inbox` is
     /// how many records wait while another thread is inside.
     pub(crate) fn new(samples: usize, clip: f32, inbox: usize) -> Self {
         Self { input: VoiceInput::new(samples, clip, inbox), seen: Glimpse::default(), at: 0 }
     }
+}
 
+impl Stream<PairInput> {
+    /// A stream of pairs, left and right in turn, that holds `pairs` of 24 kHz; what is louder than
+    /// `clip` is clipped.
+    pub(crate) fn pairs(pairs: usize, clip: f32) -> Self {
+        Self { input: PairInput::new(pairs, clip), seen: Glimpse::default(), at: 0 }
+    }
+}
+
+impl<I: Input> Stream<I> {
     /// The end that is pushed into.
-    pub fn input(&self) -> &VoiceInput {
+    pub fn input(&self) -> &I {
         &self.input
     }
 

@@ -14,8 +14,9 @@ pub(super) const PAST: usize = 20;
 pub(super) struct Head {
     /// Its centre, world metres.
     centre: [f64; 3],
-    /// Direction of the left ear.
+    /// Directions of the left ear and of the face.
     left: [f64; 3],
+    front: [f64; 3],
 }
 
 /// How a place is heard.
@@ -36,8 +37,18 @@ impl Head {
         let [x, y, z, w] = joint.rotation.to_array().map(f64::from);
         let up = [2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)];
         let left = [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)];
+        let front = [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)];
         let at = joint.position.to_array();
-        Self { centre: [0, 1, 2].map(|i| f64::from(at[i]) + height * up[i]), left }
+        Self { centre: [0, 1, 2].map(|i| f64::from(at[i]) + height * up[i]), left, front }
+    }
+
+    pub(super) fn centre(&self) -> [f64; 3] {
+        self.centre
+    }
+
+    /// Cosines of the angles between a direction and those of the left ear and of the face.
+    pub(super) fn sides(&self, direction: [f64; 3]) -> [f64; 2] {
+        [self.left, self.front].map(|axis| (0..3).map(|i| axis[i] * direction[i]).sum())
     }
 
     /// How the place `source` (world metres) is heard.
@@ -45,16 +56,17 @@ impl Head {
         let d = [0, 1, 2].map(|i| source[i] - self.centre[i]);
         let r = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
         let along = (d[0] * self.left[0] + d[1] * self.left[1] + d[2] * self.left[2]) / r.max(1e-6);
-        let angles = [along, -along].map(|cosine| libm::acos(cosine.clamp(-1.0, 1.0)));
         let distance = r.max(NEAREST);
-        let delay = |angle| (f64::from(SAMPLE_RATE) * RADIUS / SPEED * (1.0 + around(angle))) as f32;
-        Path {
-            distance,
-            gain: (1.0 / distance) as f32,
-            delay: angles.map(delay),
-            high: angles.map(|angle| brightness(angle) as f32),
-        }
+        let [delay, high] = ears_at(along).map(|ears| ears.map(|value| value as f32));
+        Path { distance, gain: (1.0 / distance) as f32, delay, high }
     }
+}
+
+/// Delay in samples and high-frequency gain of the left and the right ear for what comes from
+/// where the left ear's axis has an angle of this `cosine`.
+pub(super) fn ears_at(cosine: f64) -> [[f64; 2]; 2] {
+    let angles = [cosine, -cosine].map(|cosine| libm::acos(cosine.clamp(-1.0, 1.0)));
+    [angles.map(|angle| f64::from(SAMPLE_RATE) * RADIUS / SPEED * (1.0 + around(angle))), angles.map(brightness)]
 }
 
 /// What a source's sound has left behind at the ears.

@@ -5,7 +5,7 @@
 //! cannot be taken. So nobody waits, and no source's sound gets into another's.
 
 use super::stats::Counts;
-use crate::audio::{VoiceInput, check_rate};
+use crate::audio::{PairInput, VoiceInput, check_rate};
 use crate::error::{Error, ErrorKind, Result};
 use crate::queue::Queue;
 use glam::Vec3;
@@ -35,6 +35,8 @@ pub struct SoundInput {
 /// What both ends share.
 pub(super) struct Shared {
     pub(super) slots: Box<[Slot]>,
+    /// The host's own ears.
+    pub(super) ears: PairInput,
     pub(super) counts: Counts,
 }
 
@@ -197,7 +199,7 @@ impl SoundInput {
     /// already); [`ErrorKind::Audio`] for a rate out of range, of which nothing is taken, and for
     /// NaN or infinity among the samples, in whose place there is silence.
     pub fn push(&self, id: u32, samples: &[f32], rate: u32, position: Vec3) -> Result<()> {
-        let Shared { slots, counts } = self.shared()?;
+        let Shared { slots, counts, .. } = self.shared()?;
         if let Err(e) = check_rate(rate) {
             counts.bad_rate.fetch_add(samples.len() as u64, Relaxed);
             return Err(e);
@@ -242,6 +244,45 @@ impl SoundInput {
             inside.0.stream.clear();
             inside.0.dry.store(true, Relaxed);
         }
+        Ok(())
+    }
+
+    /// Pushes a piece of what two microphones at the agent's ears hear, pascals: as many samples of
+    /// `left` as of `right`, of `rate` Hz (8000 to 192000). For hosts that do not know where sounds
+    /// are: the direction is estimated.
+    ///
+    /// What they hear is added to what the sources give at the ears, and stands out by its own
+    /// level, where that is 6 dB over what goes on. The ears are taken to be where those of the
+    /// agent's shown head are, and to turn with it. Two ears tell one angle: until the head has
+    /// turned, what is behind is taken to be before the face; as it turns, that is put right.
+    /// Neither distance nor height is told: the place is 2 m away and 1.5 m over the floor.
+    ///
+    /// The first piece, and the first after the ears ran dry, is heard from the start of the next
+    /// block on; further pieces follow without a gap, up to ten seconds ahead (what is more is
+    /// dropped and counted). How they are cut does not matter, and left and right stay together
+    /// whatever is dropped. One thread pushes ears at a time: what comes from another one meanwhile
+    /// is dropped and counted. An empty piece changes nothing. Nothing but the first push of a rate
+    /// allocates.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] where the bundle has no hearing, and for ears of different lengths,
+    /// of which nothing is taken; [`ErrorKind::Audio`] for a rate out of range, of which nothing is
+    /// taken, and for NaN or infinity among the samples, in whose place there is silence.
+    pub fn push_ears(&self, left: &[f32], right: &[f32], rate: u32) -> Result<()> {
+        let Shared { ears, counts, .. } = self.shared()?;
+        let pushed = ears.push(left, right, rate);
+        let taken = left.len() == right.len() && check_rate(rate).is_ok() && !left.is_empty();
+        counts.pieces.fetch_add(u64::from(taken), Relaxed);
+        pushed
+    }
+
+    /// Ends what [`SoundInput::push_ears`] brought at once: what no block has heard of it is
+    /// dropped.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Argument`] where the bundle has no hearing.
+    pub fn end_ears(&self) -> Result<()> {
+        self.shared()?.ears.clear();
         Ok(())
     }
 

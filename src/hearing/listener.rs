@@ -168,18 +168,23 @@ impl Hearing {
 
     /// Its sound vector, `[S]`, with the agent's root at its end.
     pub fn vector(&mut self, root: &Root, sensitivity: f32) -> &[f32] {
-        let rest = &mut self.vector[self.told + 2 * BLOCK_FRAMES..];
-        let place = self.sources.salient().map_or([0.0; 5], |place| {
-            let local = root.to_local(Vec3::from(place.map(|v| v as f32)));
+        let place = self.place().map_or([0.0; 5], |place| {
+            let local = root.to_local(place);
             let [x, z] = [local.x, local.z].map(f64::from);
             let rho = (x * x + z * z).sqrt();
             let [sin, cos] = if rho < 1e-3 { [0.0, 1.0] } else { [x / rho, z / rho] };
             let far = libm::log2(rho.max(0.3)) - 1.0;
             [1.0, sin as f32, cos as f32, far as f32, local.y - 1.5]
         });
+        let rest = &mut self.vector[self.told + 2 * BLOCK_FRAMES..];
         rest[..5].copy_from_slice(&place);
         rest[5] = sensitivity;
         &self.vector
+    }
+
+    /// Where what stood out last is, world metres, while that is known.
+    pub fn place(&self) -> Option<Vec3> {
+        self.sources.salient().map(|place| Vec3::from(place.map(|v| v as f32)))
     }
 
     /// Starts anew: nothing was pushed. Waits for pushes that are under way.

@@ -1,5 +1,6 @@
 //! The sources that sound: which of those that are pushed are heard, and which stands out.
 
+use super::brought::{Brought, Rules};
 use super::head::{Head, PAST, Trail, level};
 use super::input::{Shared, Slot, SoundInput};
 use super::stats::{Counts, SoundStats};
@@ -75,6 +76,8 @@ pub(super) struct Sources {
     /// Up to [`SOUNDING`], in the order in which they began; those that began with one block in
     /// that of their ids. Which slots they are in does not matter.
     sources: Vec<Source>,
+    /// What a host's own ears bring.
+    brought: Brought,
     /// A source's sound: [`PAST`] samples before a block, and the block.
     sound: Box<[f32; PAST + BLOCK_SAMPLES]>,
     /// The block that the first sound of all began with.
@@ -92,10 +95,13 @@ impl Sources {
         let streams: Vec<_> = (0..SLOTS).map(|_| Stream::new(SECONDS * SAMPLE_RATE as usize, CLIP, INBOX)).collect();
         let slots = streams.iter().map(|stream| Slot::new(stream.input().clone())).collect();
         let reading = |stream| Reading { stream, changes: 0, id: None, place: None, dry: true, from: 0 };
+        let brought = Brought::new(SECONDS, CLIP, Rules { known: KNOWN, fade: FADE, hold: HOLD });
+        let ears = brought.input().clone();
         Self {
-            shared: Arc::new(Shared { slots, counts: Counts::default() }),
+            shared: Arc::new(Shared { slots, ears, counts: Counts::default() }),
             readings: streams.into_iter().map(reading).collect(),
             sources: Vec::with_capacity(SOUNDING),
+            brought,
             sound: Box::new([0.0; PAST + BLOCK_SAMPLES]),
             first: None,
             salient: None,
@@ -118,6 +124,9 @@ impl Sources {
     /// Takes notice of what was pushed: `block`, which is due, hears that and no more, and what is
     /// new begins to sound with it. `near` is about where the agent's head is.
     pub(super) fn begin(&mut self, block: u64, near: [f64; 3]) {
+        if self.brought.begin(block) {
+            self.first.get_or_insert(block);
+        }
         let (mut fresh, mut count) = ([(0, 0); SLOTS], 0);
         for (i, (reading, slot)) in self.readings.iter_mut().zip(&self.shared.slots).enumerate() {
             let owner = slot.owner();
@@ -206,8 +215,8 @@ impl Sources {
         self.shared.slots[slot].dry.store(true, Release);
     }
 
-    /// Adds what all sources give off in `block` to both ears, each `[4 frames]`, of the heads of
-    /// its frames.
+    /// Adds what all sources give off in `block`, and what a host's ears bring, to both ears, each
+    /// `[4 frames]`, of the heads of its frames.
     pub(super) fn hear(&mut self, block: u64, heads: &[Head; BLOCK_FRAMES], ears: &mut [[f32; BLOCK_SAMPLES]; 2]) {
         for i in 0..self.sources.len() {
             let Some(begins) = self.take(i, block) else { continue };
@@ -233,6 +242,7 @@ impl Sources {
             }
             source.trail.past.copy_from_slice(&self.sound[BLOCK_SAMPLES..]);
         }
+        self.brought.hear(block, heads, ears);
         self.judge();
     }
 
@@ -245,6 +255,7 @@ impl Sources {
                 (source.rings, source.lost) = (false, true);
             }
         }
+        self.brought.skip(block);
         self.judge();
     }
 
@@ -279,8 +290,10 @@ impl Sources {
         for t in 0..BLOCK_FRAMES {
             let heard = self.sources.iter().filter(|source| !source.new);
             let most = heard.reduce(|a, b| if b.course[t] > a.course[t] { b } else { a });
-            if let Some(most) = most.filter(|source| source.course[t] >= KNOWN) {
-                (self.salient, self.since) = (Some(most.place), 0);
+            let most = most.map(|source| (source.course[t], source.place));
+            let most = [most, self.brought.told(t)].into_iter().flatten().reduce(|a, b| if b.0 > a.0 { b } else { a });
+            if let Some((_, place)) = most.filter(|(course, _)| *course >= KNOWN) {
+                (self.salient, self.since) = (Some(place), 0);
             } else {
                 self.since = self.since.saturating_add(1);
             }
@@ -304,6 +317,7 @@ impl Sources {
             (reading.changes, reading.id) = (slot.owner().changes(), slot.owner().id());
             (reading.place, reading.dry, reading.from) = (None, true, 0);
         }
+        self.brought.reset();
         self.shared.counts.reset();
         self.sources.clear();
         (self.first, self.salient, self.since) = (None, None, 0);
@@ -311,8 +325,10 @@ impl Sources {
     }
 
     pub(super) fn stats(&self) -> SoundStats {
-        let mut stats = SoundStats::of(&self.shared.counts, self.readings.iter().map(|reading| reading.stream.stats()));
-        stats.started = self.started;
+        let (ears, begun) = self.brought.stats();
+        let streams = self.readings.iter().map(|reading| reading.stream.stats()).chain([ears]);
+        let mut stats = SoundStats::of(&self.shared.counts, streams);
+        stats.started = self.started + begun;
         stats.refused += self.refused;
         stats.replaced = self.replaced;
         stats

@@ -10,9 +10,10 @@ use std::sync::atomic::Ordering::Relaxed;
 pub struct SoundStats {
     /// Pushes that were taken, whole or in part.
     pub pieces: u64,
-    /// Sources that began to sound.
+    /// Sources that began to sound, and how often ears began to hear.
     pub started: u64,
-    /// Dropped because a source was more than ten seconds ahead.
+    /// Dropped because a source, or a host's ears (samples of both), was more than ten seconds
+    /// ahead.
     pub overflow_samples: u64,
     /// Clipped to 64 pascals, input samples: a sign of integers pushed as floats.
     pub clipped_samples: u64,
@@ -24,7 +25,7 @@ pub struct SoundStats {
     /// source was before, or, of one that is new, not at all.
     pub bad_places: u64,
     /// Dropped because another thread was inside the same source's input and lost its core there
-    /// for long, input samples.
+    /// for long, or pushed the same ears at that moment, input samples.
     pub contended_samples: u64,
     /// Pushes that were dropped because too many sources sounded or waited, and sources that were
     /// dropped because sixteen louder ones sounded.

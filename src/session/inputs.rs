@@ -291,6 +291,11 @@ impl Inputs {
         self.hearing.iter_mut().for_each(|hearing| hearing.begin(block, root));
     }
 
+    /// Where what stands out of what is heard is, while that is known.
+    pub(super) fn heard_place(&self) -> Option<Vec3> {
+        self.hearing.as_ref().and_then(|hearing| hearing.place())
+    }
+
     /// The input of sounds in the room.
     pub(super) fn sounds(&self) -> SoundInput {
         self.hearing.as_ref().map_or_else(SoundInput::deaf, |hearing| hearing.input())

@@ -241,6 +241,34 @@ impl Session {
         self.state.inputs.sounds().end(id)
     }
 
+    /// Pushes a piece of what two microphones at the agent's ears hear, pascals, as many samples of
+    /// each; where it comes from is estimated. The same as [`SoundInput::push_ears`] of
+    /// [`Session::sounds`], which says more.
+    ///
+    /// # Errors
+    /// As [`SoundInput::push_ears`]: [`ErrorKind::Argument`] where the bundle has no hearing, or for
+    /// ears of different lengths; [`ErrorKind::Audio`] for a bad rate or samples that are not
+    /// finite.
+    pub fn push_ears(&mut self, left: &[f32], right: &[f32], rate: u32) -> Result<()> {
+        self.state.inputs.sounds().push_ears(left, right, rate)
+    }
+
+    /// Ends what the ears brought at once. The same as [`SoundInput::end_ears`] of
+    /// [`Session::sounds`].
+    ///
+    /// # Errors
+    /// As [`SoundInput::end_ears`].
+    pub fn end_ears(&mut self) -> Result<()> {
+        self.state.inputs.sounds().end_ears()
+    }
+
+    /// Where the last block took what stands out among the sounds to be, world metres: the place of
+    /// a source, or, of what [`Session::push_ears`] brought, the direction that was estimated, 2 m
+    /// away and 1.5 m over the floor. None while nothing is known, two seconds after it has faded.
+    pub fn heard_place(&self) -> Option<Vec3> {
+        self.state.inputs.heard_place()
+    }
+
     /// The input of sounds in the room, for the threads that have them.
     pub fn sounds(&self) -> SoundInput {
         self.state.inputs.sounds()

@@ -140,6 +140,17 @@ class SessionCore {
     this.core.do("visavis_end_sound", this.pointer, id);
   }
 
+  pushEars(left, right, rate) {
+    const both = new Float32Array(2 * left.length);
+    both.set(left);
+    both.set(right, left.length);
+    this.core.withBytes(both, (at) => this.core.do("visavis_push_ears", this.pointer, at, left.length, rate));
+  }
+
+  endEars() {
+    this.core.do("visavis_end_ears", this.pointer);
+  }
+
   setSensitivity(sensitivity) {
     this.core.do("visavis_set_sensitivity", this.pointer, sensitivity);
   }

@@ -144,6 +144,14 @@ export function serve(port) {
       this.#session.endSound(id);
     }
 
+    pushEars(left, right, rate) {
+      this.#session.pushEars(left, right, rate);
+    }
+
+    endEars() {
+      this.#session.endEars();
+    }
+
     setSensitivity(sensitivity) {
       this.#session.setSensitivity(sensitivity);
     }

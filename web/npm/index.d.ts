@@ -114,6 +114,13 @@ export interface SessionOptions {
    * counted. A second takes 192 KB: a crowd that hears sound as it comes does with the least.
    */
   voiceAhead?: number;
+  /**
+   * A piece of what two microphones at the agent's ears hear, pascals, as many samples of each, `rate` 8000 to 192000 Hz: for pages that do not
+   * know where sounds are. The direction is estimated as the agent's head turns. Throws where the bundle has no hearing.
+   */
+  pushEars(left: Float32Array, right: Float32Array, rate: number): void;
+  /** Ends what the ears brought at once. */
+  endEars(): void;
   /** How much the agent minds sounds in the room: -1 dull, 0 (default) neutral, 1 sensitive, up to 1.5 either way. */
   sensitivity?: number;
   /** `real` (default): blocks are computed as time goes by. `manual`: by {@link Session.advance}. */

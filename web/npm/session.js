@@ -91,6 +91,19 @@ export class Session {
     this.#tell("endSound", [this.#source(id)]);
   }
 
+  pushEars(left, right, rate) {
+    const [first, hertz] = voice(left, rate);
+    const [second] = voice(right, rate);
+    if (left.length !== right.length) throw argument(`${left.length} samples of the left ear and ${right.length} of the right one: push as many of both`);
+    this.#mustHear();
+    this.#tell("pushEars", [first, second, hertz]);
+  }
+
+  endEars() {
+    this.#mustHear();
+    this.#tell("endEars", []);
+  }
+
   setSensitivity(sensitivity) {
     if (!(Math.abs(number("sensitivity", sensitivity)) <= 1.5)) throw argument(`sensitivity ${sensitivity}: -1.5 to 1.5`);
     this.#tell("setSensitivity", [sensitivity]);
@@ -99,8 +112,12 @@ export class Session {
   /** A source's number, where the bundle hears it. */
   #source(id) {
     typed("the number of a sound", "a whole number, 0 to 4294967295", Number.isInteger(id) && id >= 0 && id <= 0xffffffff);
-    if (!this.#hears) throw argument("this bundle has no hearing, so no sound is heard: load one whose facts.hasHearing is true");
+    this.#mustHear();
     return id;
+  }
+
+  #mustHear() {
+    if (!this.#hears) throw argument("this bundle has no hearing, so no sound is heard: load one whose facts.hasHearing is true");
   }
 
   setGaze(target) {

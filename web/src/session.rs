@@ -156,6 +156,31 @@ pub unsafe extern "C" fn visavis_end_sound(session: *mut Conversation, id: u32) 
     unsafe { with(session, |s| s.end_sound(id)) }
 }
 
+/// Pushes a piece of what two microphones at the agent's ears hear, pascals: `count` samples of the
+/// left one, then as many of the right one, 8000 to 192000 Hz.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_push_ears(
+    session: *mut Conversation,
+    ears: *const f32,
+    count: usize,
+    rate: u32,
+) -> i32 {
+    // SAFETY: the chapter on ownership, twice.
+    unsafe {
+        with(session, |s| {
+            let (left, right) = slice(ears, 2 * count).split_at(count);
+            s.push_ears(left, right, rate)
+        })
+    }
+}
+
+/// Ends what the ears brought at once.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_end_ears(session: *mut Conversation) -> i32 {
+    // SAFETY: the chapter on ownership.
+    unsafe { with(session, |s| s.end_ears()) }
+}
+
 /// Sets how much the agent minds sounds in the room: -1 dull, 0 neutral, 1 sensitive, up to 1.5
 /// either way.
 #[unsafe(no_mangle)]

@@ -193,8 +193,11 @@ fn sounds_that_are_wrong_have_a_status_and_are_counted() {
         assert_eq!(push(3, 24_000, 0.0), 6, "{}", text());
         assert_eq!(visavis_poll(conversation, 0.0), 1);
         assert_eq!(visavis_end_sound(conversation, 1), 0);
+        assert_eq!(visavis_push_ears(conversation, [0.0_f32; 8].as_ptr(), 4, 7_999), 6, "{}", text());
+        assert_eq!(visavis_push_ears(conversation, [0.0_f32; 8].as_ptr(), 4, 24_000), 0);
+        assert_eq!(visavis_end_ears(conversation), 0);
         visavis_stats(conversation);
-        let counted = r#""sounds":{"pieces":1,"started":1,"overflowSamples":0,"clippedSamples":1,"nonFiniteSamples":1,"badRateSamples":1,"badPlaces":1,"#;
+        let counted = r#""sounds":{"pieces":2,"started":1,"overflowSamples":0,"clippedSamples":1,"nonFiniteSamples":1,"badRateSamples":9,"badPlaces":1,"#;
         assert!(text().contains(counted), "{}", text());
         visavis_session_free(conversation);
         visavis_engine_free(hearing);
@@ -231,6 +234,8 @@ fn what_is_wrong_has_a_status_and_a_text() {
         assert_eq!(visavis_push_sound(conversation, 1, [0.0_f32; 4].as_ptr(), 4, 24_000, 0.0, 1.0, 2.0), 1);
         assert!(text().contains("hearing"), "{}", text());
         assert_eq!(visavis_end_sound(conversation, 1), 1, "{}", text());
+        assert_eq!(visavis_push_ears(conversation, [0.0_f32; 8].as_ptr(), 4, 24_000), 1, "{}", text());
+        assert_eq!(visavis_end_ears(conversation), 1, "{}", text());
         assert_eq!(visavis_set_sensitivity(conversation, f32::NAN), 1, "{}", text());
         assert_eq!(visavis_set_sensitivity(conversation, -1.0), 0);
         assert_eq!(visavis_poll(conversation, f64::NAN), -1, "{}", text());

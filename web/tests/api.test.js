@@ -164,6 +164,7 @@ test("sounds in the room are heard where the bundle has hearing, at their place"
   const others = [
     await motion(() => {}), await motion(beside(-1)), await motion(beside(1), { sensitivity: 1 }), await motion((session) => { beside(1)(session); session.endSound(7); }),
     await motion((session) => { session.setSensitivity(-1); beside(1)(session); }),
+    await motion((session) => session.pushEars(bang, bang.map((v) => v / 2), 24000)), await motion((session) => session.pushEars(bang.map((v) => v / 2), bang, 24000)),
   ];
   for (const other of others) assert.ok(!heard.bits.equals(other.bits));
 
@@ -172,6 +173,9 @@ test("sounds in the room are heard where the bundle has hearing, at their place"
   for (const place of [null, [0, 1], "here", [0, 1, "2"]]) assert.throws(() => session.pushSound(1, bang, 24000, place), kind("argument", /three numbers/));
   assert.throws(() => session.pushSound(1, [0, 1], 24000, [0, 1, 2]), kind("argument", /Float32Array/));
   assert.throws(() => session.pushSound(1, bang, 0, [0, 1, 2]), kind("audio", /8000/));
+  assert.throws(() => session.pushEars(bang, bang.subarray(1), 24000), kind("argument", /as many of both/));
+  assert.throws(() => session.pushEars(bang, [0, 1], 24000), kind("argument", /Float32Array/));
+  session.endEars();
   for (const value of [1.6, NaN, "1"]) assert.throws(() => session.setSensitivity(value), kind("argument", /sensitivity/));
   await assert.rejects(engine.session({ sensitivity: -2 }).ready, kind("argument", /sensitivity/));
   const told = [];
@@ -192,6 +196,8 @@ test("sounds in the room are heard where the bundle has hearing, at their place"
   const without = deaf.session({ clock: "manual" });
   assert.throws(() => without.pushSound(1, bang, 24000, [0, 1, 2]), kind("argument", /hearing/));
   assert.throws(() => without.endSound(1), kind("argument", /hearing/));
+  assert.throws(() => without.pushEars(bang, bang, 24000), kind("argument", /hearing/));
+  assert.throws(() => without.endEars(), kind("argument", /hearing/));
   without.setSensitivity(1);
   await without.advance(0.2);
   deaf.close();

@@ -40,6 +40,8 @@ native!("Java_org_visavis_Native_pushSoundArray": push_sound_array(
     session: jlong, id: jint, samples: jfloat[], offset: jint, count: jint, rate: jint, x: jfloat, y: jfloat, z: jfloat
 ));
 native!("Java_org_visavis_Native_endSound": end_sound(session: jlong, id: jint));
+native!("Java_org_visavis_Native_pushEars": push_ears(session: jlong, left: jfloat[], right: jfloat[], offset: jint, count: jint, rate: jint));
+native!("Java_org_visavis_Native_endEars": end_ears(session: jlong));
 native!("Java_org_visavis_Native_setSensitivity": set_sensitivity(session: jlong, sensitivity: jfloat));
 native!("Java_org_visavis_Native_pushHead": push_head(session: jlong, x: jfloat, y: jfloat, z: jfloat, time: jdouble));
 native!("Java_org_visavis_Native_pushPose": push_pose(
@@ -236,6 +238,33 @@ fn push_sound_array<'l>(
 
 fn end_sound<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, id: jint) -> Outcome {
     around(session, |shared| Ok(shared.sounds().end(id as u32)?))
+}
+
+#[expect(clippy::too_many_arguments, reason = "a part of two arrays is four")]
+fn push_ears<'l>(
+    env: &mut Env<'l>,
+    _: JClass<'l>,
+    session: jlong,
+    left: JFloatArray<'l>,
+    right: JFloatArray<'l>,
+    offset: jint,
+    count: jint,
+    rate_: jint,
+) -> Outcome {
+    if left.is_null() || right.is_null() {
+        return Err(jni::errors::Error::NullPtr("samples are null").into());
+    }
+    let count = part(left.len(env)?, offset, count)?.min(part(right.len(env)?, offset, count)?);
+    with_scratch(2 * count, |scratch| {
+        let (first, second) = scratch.split_at_mut(count);
+        left.get_region(env, offset, first)?;
+        right.get_region(env, offset, second)?;
+        around(session, |shared| Ok(shared.sounds().push_ears(first, second, rate(rate_)?)?))
+    })
+}
+
+fn end_ears<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong) -> Outcome {
+    around(session, |shared| Ok(shared.sounds().end_ears()?))
 }
 
 fn finish_voice<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, voice: jint) -> Outcome {

@@ -40,6 +40,8 @@ namespace Visavis
         [DllImport(Library)] public static extern Status visavis_session_dyadic(SessionHandle session, [Out] float[] shares, UIntPtr capacity, out UIntPtr count);
         [DllImport(Library)] public static extern Status visavis_session_push_sound(SessionHandle session, uint id, IntPtr samples, UIntPtr count, uint rate, float x, float y, float z);
         [DllImport(Library)] public static extern Status visavis_session_end_sound(SessionHandle session, uint id);
+        [DllImport(Library)] public static extern Status visavis_session_push_ears(SessionHandle session, IntPtr left, IntPtr right, UIntPtr count, uint rate);
+        [DllImport(Library)] public static extern Status visavis_session_end_ears(SessionHandle session);
         [DllImport(Library)] public static extern Status visavis_session_set_sensitivity(SessionHandle session, float sensitivity);
         [DllImport(Library)] public static extern Status visavis_session_set_gaze(SessionHandle session, float target);
         [DllImport(Library)] public static extern Status visavis_session_set_natural_gaze(SessionHandle session);

@@ -115,6 +115,47 @@ namespace Visavis
         /// <exception cref="ArgumentException">The bundle has no hearing.</exception>
         public void EndSound(uint id) => Errors.Check(Native.visavis_session_end_sound(handle, id));
 
+        /// <summary>
+        /// A piece of what two microphones at the agent's ears hear, pascals, `count` samples of each from `offset` on, of 8000 to 192000 Hz: for hosts that
+        /// do not know where sounds are. The direction is estimated as the agent's head turns. The first piece is heard from the next block on, further
+        /// ones follow it, up to ten seconds ahead. One thread at a time.
+        /// </summary>
+        /// <exception cref="ArgumentException">
+        /// The bundle has no hearing (Engine.HasHearing) or the rate is bad: nothing was taken. Samples that are not finite: silence is in their place.
+        /// </exception>
+        public void PushEars(float[] left, float[] right, int offset, int count, int rate)
+        {
+            var pinned = Pin(left, offset, count, out var first);
+            try
+            {
+                var other = Pin(right, offset, count, out var second);
+                try
+                {
+                    Errors.Check(Native.visavis_session_push_ears(handle, first, second, (UIntPtr)count, (uint)Math.Max(rate, 0)));
+                }
+                finally
+                {
+                    other.Free();
+                }
+            }
+            finally
+            {
+                pinned.Free();
+            }
+        }
+
+        /// <summary>All of two arrays of one length.</summary>
+        public void PushEars(float[] left, float[] right, int rate)
+        {
+            if (left != null && right != null && left.Length != right.Length)
+                throw new ArgumentException(left.Length + " samples of the left ear and " + right.Length + " of the right one: push as many of both");
+            PushEars(left, right, 0, left?.Length ?? 0, rate);
+        }
+
+        /// <summary>Ends what the ears brought at once.</summary>
+        /// <exception cref="ArgumentException">The bundle has no hearing.</exception>
+        public void EndEars() => Errors.Check(Native.visavis_session_end_ears(handle));
+
         /// <summary>How much the agent minds sounds in the room: -1 dull, 0 neutral, 1 sensitive, up to 1.5 either way.</summary>
         public void SetSensitivity(float sensitivity) => Errors.Check(Native.visavis_session_set_sensitivity(handle, sensitivity));
 

@@ -116,6 +116,13 @@ namespace Visavis.Tests
                 {
                     Check.Throws<ArgumentException>(() => deaf.PushSound(1, new float[9], 24000, 0, 1, 2), "hearing");
                     Check.Throws<ArgumentException>(() => deaf.EndSound(1), "hearing");
+                    Check.Throws<ArgumentException>(() => deaf.PushEars(new float[9], new float[9], 24000), "hearing");
+                    Check.Throws<ArgumentException>(() => deaf.EndEars(), "hearing");
+                    Check.Throws<ArgumentException>(() => session.PushEars(new float[9], new float[8], 24000), "as many");
+                    Check.Throws<ArgumentNullException>(() => session.PushEars(new float[9], null, 24000));
+                    Check.Throws<ArgumentOutOfRangeException>(() => session.PushEars(new float[9], new float[8], 0, 9, 24000));
+                    session.PushEars(new float[9], new float[9], 24000);
+                    session.EndEars();
                     Check.Throws<ArgumentException>(() => session.PushSound(1, new float[9], 24000, float.NaN, 1, 2), "metres");
                     Check.Throws<ArgumentException>(() => session.PushSound(1, new float[9], 0, 0, 1, 2));
                     Check.Throws<ArgumentException>(() => session.PushSound(1, new[] { 0, float.NaN }, 24000, 0, 1, 2));

@@ -1,9 +1,9 @@
 //! Chroma: how much of each pitch class is in a frame, by the constant-Q and by the Fourier
 //! transform.
 
-use super::fft::{Complex, Fft};
 use super::spectra::{N_FFT, filtered, hann, powers};
 use super::{CHROMA, unit_peak};
+use crate::audio::fft::{Complex, Fft};
 use crate::frame::SAMPLE_RATE;
 use std::f64::consts::TAU;
 

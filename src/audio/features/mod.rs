@@ -15,11 +15,8 @@
 //! silence, normalised features take any noise for signal. The same bits on every CPU.
 
 mod chroma;
-mod fft;
 mod rhythm;
 mod spectra;
-
-pub use fft::{Complex, Fft};
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::frame::FRAME_SAMPLES;

@@ -1,8 +1,8 @@
 //! Frames of sound, their spectra, and what is read from the loudness of bands: decibels of mel
 //! bands, cepstral coefficients, slopes.
 
-use super::fft::{Complex, Fft};
 use super::{HOP, MFCC};
+use crate::audio::fft::{Complex, Fft};
 use crate::frame::SAMPLE_RATE;
 use std::f64::consts::{PI, TAU};
 

@@ -45,6 +45,8 @@ pub enum Command {
     Live(super::live::LiveArgs),
     /// Reacts to sounds around the agent, eight seconds at a time (bundles of the kind mospa)
     React(super::react::ReactArgs),
+    /// Tells where what two microphones hear comes from, as a session takes it to be
+    Locate(LocateArgs),
     /// Runs given conditioning and noise through a bundle and writes every stage
     Trace(TraceArgs),
 }
@@ -90,7 +92,7 @@ pub struct DemoArgs {
 }
 
 #[derive(Debug, Clone, Args)]
-#[group(id = "inputs", required = true, multiple = true, args = ["agent", "user", "user_path", "sound"])]
+#[group(id = "inputs", required = true, multiple = true, args = ["agent", "user", "user_path", "sound", "ears"])]
 pub struct GenerateArgs {
     /// The agent's voice: WAV, 8 to 192 kHz, int or float, mono or more; left out, it is absent
     #[arg(long, value_name = "WAV")]
@@ -108,11 +110,27 @@ pub struct GenerateArgs {
     /// full scale is 1 pascal). As many as you like; sixteen sources sound at once
     #[arg(long, value_name = "WAV@X,Y,Z[:t=S][:id=N][:db=L]")]
     pub sound: Vec<String>,
+    /// What two microphones at the agent's ears hear, for bundles with hearing: stereo WAV, the
+    /// left one first, full scale 1 pascal, and when it begins (seconds). Where it comes from is
+    /// estimated
+    #[arg(long, value_name = "WAV[:t=S]")]
+    pub ears: Option<String>,
     #[command(flatten)]
     pub run: RunArgs,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/generate")]
     pub out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct LocateArgs {
+    /// Stereo WAV, the left ear first, full scale 1 pascal, and when it begins (seconds)
+    #[arg(value_name = "WAV[:t=S]")]
+    pub ears: String,
+    /// How the head turns: CSV with the header t,yaw, seconds and degrees, 0 is +z and 90 +x, to
+    /// which azimuths are told too; left out, it stays at 0
+    #[arg(long, value_name = "CSV")]
+    pub turns: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -57,6 +57,9 @@ pub struct BenchArgs {
     /// hearing then
     #[arg(long, value_name = "N", num_args = 1.., value_delimiter = ',', value_parser = clap::builder::RangedU64ValueParser::<u32>::new().range(0..=16), conflicts_with_all = ["load", "sessions"])]
     pub sounds: Vec<u32>,
+    /// With --sounds: two microphones at the agent's ears hear something as well
+    #[arg(long, requires = "sounds")]
+    pub ears: bool,
     /// Leaves out the cold start, for which processes of their own load the bundle
     #[arg(long)]
     pub no_cold_start: bool,
@@ -209,7 +212,7 @@ fn with_sounds(args: &BenchArgs, samplers: &[Sampler], engine: &Arc<Engine>, mac
     for &sampler in samplers {
         for &threads in &args.threads {
             for &sources in &args.sounds {
-                let options = SoundOptions { sampler, threads, sources, blocks: args.blocks };
+                let options = SoundOptions { sampler, threads, sources, ears: args.ears, blocks: args.blocks };
                 all.push(WithSounds::run(engine, options)?);
             }
         }
@@ -218,8 +221,9 @@ fn with_sounds(args: &BenchArgs, samplers: &[Sampler], engine: &Arc<Engine>, mac
         return print(&format!("{:#}\n", serde_json::json!({ "machine": machine, "with_sounds": all })));
     }
     let mut text = format!("{} ({} processors), {}\n", machine.cpu, machine.processors, engine.config().name);
-    for WithSounds { sampler, threads, sources, block_ms: [without, with], .. } in &all {
-        let _ = writeln!(text, "\n{sampler}, {threads} threads, {sources} sources");
+    for WithSounds { sampler, threads, sources, ears, block_ms: [without, with], .. } in &all {
+        let also = if *ears { " and ears" } else { "" };
+        let _ = writeln!(text, "\n{sampler}, {threads} threads, {sources} sources{also}");
         for (name, times) in [("without", without), ("with", with)] {
             let times = times.named().map(|(name, value)| format!("{name} {value:.2}"));
             let _ = writeln!(text, "  {name:<9} {} ms", times.join(", "));

@@ -55,7 +55,7 @@ pub fn conversation() -> Result<Conversation> {
 /// The sample conversation with sounds in the room.
 pub fn interrupted(sounds: Vec<Sound>) -> Result<Conversation> {
     let [agent, user, path] = ["agent.wav", "user.wav", "user.csv"].map(sample);
-    Conversation::read_with(Some(&agent?), Some(&user?), Some(&path?), sounds)
+    Conversation::read_with(Some(&agent?), Some(&user?), Some(&path?), sounds, None)
 }
 
 /// An error if both names stand for one file: a mapped bundle must not be written to.

@@ -9,14 +9,16 @@ use visavis::stats::SessionStats;
 use visavis::{Engine, Result};
 use visavis_tools::export::viewer::Meta;
 use visavis_tools::metrics::Summary;
-use visavis_tools::offline::{self, Conversation, Outcome, OutputFolder, Sound};
+use visavis_tools::offline::{self, Conversation, Ears, Outcome, OutputFolder, Sound};
 
 pub fn run(args: &GenerateArgs) -> Result<()> {
     let out = OutputFolder::prepare(&args.out)?;
     let inputs = [&args.agent, &args.user, &args.user_path].map(|file| file.as_deref());
     let sounds = args.sound.iter().map(|text| Sound::read(text)).collect::<Result<Vec<_>>>()?;
-    let titles: Vec<_> = sounds.iter().map(|sound| sound.name.clone()).collect();
-    let talk = Conversation::read_with(inputs[0], inputs[1], inputs[2], sounds)?;
+    let ears = args.ears.as_deref().map(Ears::read).transpose()?;
+    let titles: Vec<_> =
+        sounds.iter().map(|sound| &sound.name).chain(ears.as_ref().map(|ears| &ears.name)).cloned().collect();
+    let talk = Conversation::read_with(inputs[0], inputs[1], inputs[2], sounds, ears)?;
     let name = |file: &Path| Some(file.file_name()?.to_string_lossy().into_owned());
     let names: Vec<_> = inputs.into_iter().flatten().filter_map(name).chain(titles).collect();
     generate(&args.run, &talk, "Visavis", &names.join(", "), out)
@@ -26,7 +28,7 @@ pub fn run(args: &GenerateArgs) -> Result<()> {
 pub fn generate(args: &RunArgs, talk: &Conversation, title: &str, subtitle: &str, out: OutputFolder) -> Result<()> {
     let model = files::model(args.model.as_deref())?;
     let engine = Engine::load(&model)?;
-    if !talk.sounds().is_empty() {
+    if talk.has_sounds() {
         files::hears(&engine, &model)?;
     }
     let mut session = engine.session(args.options())?;

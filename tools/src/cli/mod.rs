@@ -13,6 +13,7 @@ mod files;
 mod generate;
 mod inspect;
 mod live;
+mod locate;
 mod progress;
 mod quantize;
 mod react;
@@ -40,6 +41,7 @@ pub fn main() -> ExitCode {
             Command::Eval(args) => eval::run(&args),
             Command::Calibrate(args) => calibrate::run(&args),
             Command::Soak(args) => soak::run(&args),
+            Command::Locate(args) => locate::run(&args),
             Command::Trace(args) => trace::run(&args),
             Command::Live(args) => live::run(&args),
             Command::React(args) => react::run(&args),

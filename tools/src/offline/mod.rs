@@ -24,12 +24,14 @@
 //! ```
 
 mod csv;
+mod ears;
 mod output;
 mod path;
 mod sound;
 mod wav;
 
 pub use csv::UserPath;
+pub use ears::Ears;
 pub use output::{FILES, OutputFolder};
 pub use path::for_session;
 pub use sound::Sound;
@@ -58,6 +60,8 @@ pub struct Conversation {
     path: Option<UserPath>,
     /// Sounds in the room, each with the number of its source.
     sounds: Vec<(u32, Sound)>,
+    /// What two microphones at the agent's ears hear.
+    ears: Option<Ears>,
 }
 
 impl Conversation {
@@ -68,11 +72,12 @@ impl Conversation {
     /// # Errors
     /// Those of the readers, and of [`Conversation::new`], naming the file.
     pub fn read(agent: Option<&Path>, user: Option<&Path>, path: Option<&Path>) -> Result<Self> {
-        Self::read_with(agent, user, path, Vec::new())
+        Self::read_with(agent, user, path, Vec::new(), None)
     }
 
     /// As [`Conversation::read`], with sounds in the room: without an `id` each is a source of its
-    /// own; sounds of one source are more than two blocks (0.27 s) apart.
+    /// own; sounds of one source are more than two blocks (0.27 s) apart. And with what two
+    /// microphones at the agent's ears hear.
     ///
     /// # Errors
     /// As [`Conversation::read`]; [`ErrorKind::Argument`] for sounds of one source that are not.
@@ -81,6 +86,7 @@ impl Conversation {
         user: Option<&Path>,
         path: Option<&Path>,
         sounds: Vec<Sound>,
+        ears: Option<Ears>,
     ) -> Result<Self> {
         let voice = |file: &Path| Wav::read(file)?.to_24k().map_err(|e| e.with_path(file));
         let talk = Self {
@@ -88,6 +94,7 @@ impl Conversation {
             user: user.map(voice).transpose()?,
             path: path.map(UserPath::read).transpose()?,
             sounds: numbered(sounds)?,
+            ears,
         };
         // The length is checked file by file, so that the error can name the one that is too long.
         for (file, seconds) in [agent, user, path].into_iter().zip(talk.lengths()) {
@@ -109,7 +116,7 @@ impl Conversation {
     /// is all there is and ends at or before 0 s; either when a part is longer than
     /// [`MAX_SECONDS`].
     pub fn new(agent: Option<Vec<f32>>, user: Option<Vec<f32>>, path: Option<UserPath>) -> Result<Self> {
-        let talk = Self { agent, user, path, sounds: Vec::new() };
+        let talk = Self { agent, user, path, sounds: Vec::new(), ears: None };
         talk.lengths().into_iter().flatten().try_for_each(check_length)?;
         talk.checked()
     }
@@ -135,7 +142,8 @@ impl Conversation {
     /// Seconds of the agent's voice, the user's voice, the path and the sounds.
     fn lengths(&self) -> [Option<f64>; 4] {
         let voice = |v: &Vec<f32>| v.len() as f64 / f64::from(SAMPLE_RATE);
-        let sounds = self.sounds.iter().map(|(_, sound)| sound.end()).reduce(f64::max);
+        let ends = self.sounds.iter().map(|(_, sound)| sound.end());
+        let sounds = ends.chain(self.ears.as_ref().map(Ears::end)).reduce(f64::max);
         [self.agent.as_ref().map(voice), self.user.as_ref().map(voice), self.path.as_ref().map(UserPath::end), sounds]
     }
 
@@ -176,6 +184,11 @@ impl Conversation {
         &self.sounds
     }
 
+    /// Whether there is anything in the room to hear.
+    pub fn has_sounds(&self) -> bool {
+        !self.sounds.is_empty() || self.ears.is_some()
+    }
+
     /// The path of the user's head.
     pub fn path(&self) -> Option<&UserPath> {
         self.path.as_ref()
@@ -211,18 +224,34 @@ fn blocks(sound: &Sound) -> Range<usize> {
 }
 
 fn first_sample(sound: &Sound) -> usize {
-    (sound.start * f64::from(SAMPLE_RATE)).round() as usize
+    first_of(sound.start)
+}
+
+/// The sample at a time.
+fn first_of(start: f64) -> usize {
+    (start * f64::from(SAMPLE_RATE)).round() as usize
+}
+
+/// What is heard in block `block`, from the block's start on, of ears that begin at a time.
+fn ears_piece(ears: &Ears, block: usize) -> Option<[Vec<f32>; 2]> {
+    let ear = |side: usize| piece_of(&ears.samples[side], first_of(ears.start), block);
+    Some([ear(0)?, ear(1)?])
 }
 
 /// What a source gives off in block `block`, from the block's start on; none before the sound
 /// begins and after it has ended.
 fn piece(sound: &Sound, block: usize) -> Option<Vec<f32>> {
-    let (first, from) = (first_sample(sound), block * BLOCK_SAMPLES);
+    piece_of(&sound.samples, first_sample(sound), block)
+}
+
+/// The samples of block `block`, from its start on, of those that begin with sample `first`.
+fn piece_of(samples: &[f32], first: usize, block: usize) -> Option<Vec<f32>> {
+    let from = block * BLOCK_SAMPLES;
     let silence = first.saturating_sub(from);
     if silence >= BLOCK_SAMPLES {
         return None;
     }
-    let rest = sound.samples.get(from.saturating_sub(first)..).filter(|rest| !rest.is_empty())?;
+    let rest = samples.get(from.saturating_sub(first)..).filter(|rest| !rest.is_empty())?;
     let mut piece = vec![0.0; silence];
     piece.extend_from_slice(&rest[..rest.len().min(BLOCK_SAMPLES - silence)]);
     Some(piece)
@@ -293,7 +322,7 @@ fn recorded(talk: &Conversation, heard: Vec<f32>) -> Option<Sounds> {
         position: sound.place.as_vec3(),
         seconds: [sound.start, sound.end()],
     };
-    (!talk.sounds.is_empty()).then(|| Sounds { sources: talk.sounds.iter().map(source).collect(), heard })
+    talk.has_sounds().then(|| Sounds { sources: talk.sounds.iter().map(source).collect(), heard })
 }
 
 /// Resets `session`, plays the whole conversation to it and returns the motion; `progress` is
@@ -312,7 +341,10 @@ pub fn run(session: &mut Session, talk: &Conversation, progress: &mut dyn FnMut(
         // An empty piece: whether it could be pushed at all.
         session.push_sound(*id, &[], SAMPLE_RATE, place(sound))?;
     }
-    let mut heard = HeardSounds(vec![0.0; if talk.sounds.is_empty() { 0 } else { talk.frames() * FRAME_SAMPLES }]);
+    if talk.ears.is_some() {
+        session.push_ears(&[], &[], SAMPLE_RATE)?;
+    }
+    let mut heard = HeardSounds(vec![0.0; if talk.has_sounds() { talk.frames() * FRAME_SAMPLES } else { 0 }]);
     let total = talk.frames();
     let points = talk.path.as_ref().map(path::poses_for_session).unwrap_or_default();
     let mut points = points.into_iter().peekable();
@@ -335,7 +367,10 @@ pub fn run(session: &mut Session, talk: &Conversation, progress: &mut dyn FnMut(
                 session.push_sound(*id, &piece, SAMPLE_RATE, place(sound))?;
             }
         }
-        let probe = (!talk.sounds.is_empty()).then_some(&mut heard as &mut dyn Probe);
+        if let Some([left, right]) = talk.ears.as_ref().and_then(|ears| ears_piece(ears, block)) {
+            session.push_ears(&left, &right, SAMPLE_RATE)?;
+        }
+        let probe = talk.has_sounds().then_some(&mut heard as &mut dyn Probe);
         if let Some(block) = session.poll_with(now, probe)? {
             let wanted = block.len().min(total - frames.len());
             frames.extend_from_slice(&block[..wanted]);
@@ -417,7 +452,7 @@ mod tests {
         assert_eq!(pieces.iter().map(|p| p.as_ref().map_or(0, Vec::len)).collect::<Vec<_>>(), [0, 0, 3200, 2600, 0, 0]);
         let all: Vec<_> = pieces.into_iter().flatten().flatten().collect();
         assert!(all[..800].iter().all(|s| *s == 0.0) && all[800..] == bang.samples);
-        let talk = |sounds| Conversation::read_with(None, None, None, sounds);
+        let talk = |sounds| Conversation::read_with(None, None, None, sounds, None);
         let two = talk(vec![sound(0.0, 100, None), sound(0.0, 100, Some(0)), sound(1.0, 2_400, Some(0))]).unwrap();
         assert_eq!(two.sounds().iter().map(|(id, _)| *id).collect::<Vec<_>>(), [1, 0, 0]);
         assert!((two.seconds() - 1.1).abs() < 1e-9);

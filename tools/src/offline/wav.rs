@@ -37,11 +37,35 @@ impl Wav {
         Self::parse(&bytes).map_err(|e| e.with_path(path))
     }
 
+    /// As [`Wav::read`], the left and the right channel of a file that has two.
+    ///
+    /// # Errors
+    /// As [`Wav::read`], and for another number of channels.
+    pub fn read_pair(path: impl AsRef<Path>) -> Result<[Self; 2]> {
+        let path = path.as_ref();
+        let bytes = visavis::internals::bounded::read(path, MAX_BYTES)
+            .map_err(|e| Error::io("read the sound file", path, e))?;
+        Self::parse_pair(&bytes).map_err(|e| e.with_path(path))
+    }
+
+    fn parse_pair(bytes: &[u8]) -> Result<[Self; 2]> {
+        let (Self { samples, rate }, channels) = Self::parse_as(bytes, true)?;
+        if channels != 2 {
+            return Err(bad(format!("{channels} channels; ears are a stereo file, the left one first")));
+        }
+        Ok([0, 1].map(|side| Self { samples: samples.iter().skip(side).step_by(2).copied().collect(), rate }))
+    }
+
     /// As [`Wav::read`], from the bytes of a file.
     ///
     /// # Errors
     /// As [`Wav::read`], without a file name.
     pub fn parse(bytes: &[u8]) -> Result<Self> {
+        Self::parse_as(bytes, false).map(|(wav, _)| wav)
+    }
+
+    /// With `apart`, the samples of all channels in turn; and how many channels there are.
+    fn parse_as(bytes: &[u8], apart: bool) -> Result<(Self, usize)> {
         let chunks = Chunks::find(bytes)?;
         if chunks.data_len > chunks.data.len() {
             return Err(bad(format!(
@@ -56,10 +80,10 @@ impl Wav {
         let head = [&b"RIFF\0\0\0\0WAVE"[..], chunks.format, b"data", &data_len].concat();
         chunks.check_width()?;
         let reader = hound::WavReader::new(Cursor::new(head).chain(chunks.data)).map_err(|e| decode_error(&e))?;
-        Self::decode(reader)
+        Self::decode(reader, apart)
     }
 
-    fn decode(mut reader: hound::WavReader<impl Read>) -> Result<Self> {
+    fn decode(mut reader: hound::WavReader<impl Read>, apart: bool) -> Result<(Self, usize)> {
         let spec = reader.spec();
         check_rate(spec.sample_rate)?;
         if spec.channels > MAX_CHANNELS {
@@ -69,15 +93,16 @@ impl Wav {
             return Err(bad("there are no samples in it; record or convert it again"));
         }
         let channels = usize::from(spec.channels);
-        let mut samples = Vec::with_capacity(reader.duration() as usize);
+        let mixed = if apart { 1 } else { channels };
+        let mut samples = Vec::with_capacity(reader.len() as usize / mixed);
         match spec.sample_format {
-            hound::SampleFormat::Float => mix(reader.samples::<f32>(), channels, 1.0, &mut samples)?,
+            hound::SampleFormat::Float => mix(reader.samples::<f32>(), mixed, 1.0, &mut samples)?,
             hound::SampleFormat::Int => {
                 let scale = 1.0 / (1u64 << (spec.bits_per_sample - 1)) as f32;
-                mix(reader.samples::<i32>().map(|s| s.map(|v| v as f32)), channels, scale, &mut samples)?;
+                mix(reader.samples::<i32>().map(|s| s.map(|v| v as f32)), mixed, scale, &mut samples)?;
             }
         }
-        Ok(Self { samples, rate: spec.sample_rate })
+        Ok((Self { samples, rate: spec.sample_rate }, channels))
     }
 
     /// Length, seconds.
@@ -214,6 +239,18 @@ mod tests {
         let e = Wav::parse(bytes).unwrap_err();
         assert_eq!(e.kind(), ErrorKind::Audio);
         assert!(e.to_string().contains(part), "{e}");
+    }
+
+    #[test]
+    fn ears_are_two_channels() {
+        let stereo = file(2, 48_000, 32, SampleFormat::Float, &SAMPLES);
+        let [left, right] = Wav::parse_pair(&stereo).unwrap();
+        assert_eq!((left.samples, left.rate), (vec![0.0, -0.5, -1.0, 0.125], 48_000));
+        assert_eq!(right.samples, [0.5, 0.25, 0.75, -0.875]);
+        for channels in [1, 4] {
+            let other = file(channels, 24_000, 16, SampleFormat::Int, &SAMPLES);
+            assert_eq!(Wav::parse_pair(&other).unwrap_err().kind(), ErrorKind::Audio);
+        }
     }
 
     const SAMPLES: [f32; 8] = [0.0, 0.5, -0.5, 0.25, -1.0, 0.75, 0.125, -0.875];

@@ -93,6 +93,11 @@ final class ErrorTest {
             float[] sound = {0, Float.NaN, 65};
             throwsWith(ARGUMENT, "hearing", () -> deaf.pushSound(1, sound, 0, 1, 24_000, 0, 1, 2));
             throwsWith(ARGUMENT, "hearing", () -> deaf.endSound(1));
+            throwsWith(ARGUMENT, "hearing", () -> deaf.pushEars(sound, sound, 0, 1, 24_000));
+            throwsWith(ARGUMENT, "hearing", () -> deaf.endEars());
+            throwsWith(ARGUMENT, "array has 3", () -> session.pushEars(new float[9], sound, 0, 9, 24_000));
+            throwsWith(NullPointerException.class, "null", () -> session.pushEars(sound, null, 0, 1, 24_000));
+            session.endEars();
             throwsWith(ARGUMENT, "metres", () -> session.pushSound(1, sound, 0, 1, 24_000, Float.NaN, 1, 2));
             throwsWith(ARGUMENT, "Hz", () -> session.pushSound(1, sound, 0, 1, 0, 0, 1, 2));
             throwsWith(ARGUMENT, "negative", () -> session.pushSound(1, sound, 0, 1, -1, 0, 1, 2));

@@ -62,6 +62,10 @@ final class Native {
 
     static native void endSound(long session, int id);
 
+    static native void pushEars(long session, float[] left, float[] right, int offset, int count, int rate);
+
+    static native void endEars(long session);
+
     static native void setSensitivity(long session, float sensitivity);
 
     static native void pushHead(long session, float x, float y, float z, double time);

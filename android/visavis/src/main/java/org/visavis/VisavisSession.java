@@ -116,6 +116,30 @@ public final class VisavisSession implements AutoCloseable {
     }
 
     /**
+     * Appends to what two microphones at the agent's ears hear, pascals: for hosts that do not know where sounds are. The direction is estimated as the
+     * agent's head turns. The first piece is heard from the next block on, further ones follow it, up to ten seconds ahead (more is dropped and counted).
+     * One thread at a time.
+     *
+     * @param count samples of each, from offset on
+     * @param rate samples a second, 8000 to 192000
+     * @throws IllegalArgumentException where the bundle has no hearing ({@link VisavisEngine#hasHearing}) or for a rate out of range (nothing is taken),
+     *     or samples that are not finite (they become silence, all others are taken)
+     * @throws IllegalStateException when this session is closed
+     */
+    public void pushEars(@NonNull float[] left, @NonNull float[] right, int offset, int count, int rate) {
+        Native.pushEars(handle, left, right, offset, count, rate);
+    }
+
+    /**
+     * Ends what the ears brought at once: what no block has heard of it is dropped.
+     *
+     * @throws IllegalArgumentException where the bundle has no hearing
+     */
+    public void endEars() {
+        Native.endEars(handle);
+    }
+
+    /**
      * Sets how much the agent minds sounds in the room from the next block on: -1 dull, 0 neutral, 1 sensitive, numbers between and up to 1.5 either way.
      *
      * @throws IllegalArgumentException outside -1.5 to 1.5

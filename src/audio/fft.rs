@@ -112,6 +112,7 @@ impl Fft {
     ///
     /// # Panics
     /// As [`Fft::forward`].
+    #[cfg(any(test, feature = "internals"))]
     pub fn inverse(&self, x: &mut [Complex]) {
         x.iter_mut().for_each(|v| *v = v.conj());
         self.forward(x);
