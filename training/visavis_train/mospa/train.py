@@ -1,6 +1,6 @@
 """Trains the denoiser to give back the clean motion.
 
-    python -m visavis_train.mospa.train --corpus WORK/mospa/corpus --out runs/mospa.pt --steps 2800 --batch 16
+    python -m visavis_train.mospa.train --corpus WORK/mospa/corpus --out runs/mospa.pt --steps 2300 --batch 16
     python -m visavis_train.mospa.train --corpus ... --out runs/small.pt --width 96 --layers 2 --steps 300 --lr 2e-3 [--no-genre]        an ablation
 
 The paper's: squared error of motion and of its change from frame to frame, of joints by forward kinematics and their change, of the feet's velocity, of the way
