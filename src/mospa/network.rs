@@ -14,7 +14,7 @@ use crate::normaliser::{Metric, Normaliser, Standardised};
 
 /// Standardised features are within.
 const LIMIT: f32 = 8.0;
-/// Tokens before those of sound and motion: step, sensitivity, source.
+/// Tokens before the patches: step, sensitivity, source.
 const LEAD: usize = 3;
 /// Numbers of a source: direction, logarithm of the distance, whether it is known.
 const SOURCE: usize = 5;
@@ -46,8 +46,10 @@ pub(super) struct Work {
     pass: Pass,
     cache: KvCache,
     spans: Vec<Span>,
-    /// Genre, source and sound, `[2 + P, W]`.
+    /// Genre and source, `[2, W]`.
     given: Vec<f32>,
+    /// What each patch is told beside its motion and the step, `[P, W]`.
+    told: Vec<f32>,
 }
 
 /// `[cos n f_0 .. cos n f_(h-1), sin ..]` with `f_i = 10000^(-i / h)`, half of the width each.
@@ -103,7 +105,7 @@ impl Network {
             motion_in: linear("motion", w, c.patch * d)?,
             out: linear("out", c.patch * d, w)?,
             genres: t.f32("mospa.genre", &[UNKNOWN + 1, w])?,
-            slots: t.f32("mospa.slots", &[5, w])?,
+            slots: t.f32("mospa.slots", &[4, w])?,
             waves: (0..c.frames / c.patch).flat_map(|k| wave(k, w)).collect(),
             layers,
             norms: PlainNorms { layers: norms, last: affine("ln_f")? },
@@ -134,11 +136,10 @@ impl Network {
     pub(super) fn work(&self, kernels: Kernels, threads: usize, heard: &Heard<'_>) -> Result<Work> {
         let MospaConfig { width: w, heads, mlp, patch, .. } = self.config;
         let (patches, widest) = (self.patches(), (patch * self.motion.width()).max(patch * 2 * SIZE).max(w * mlp));
-        let tokens = LEAD + 2 * patches;
+        let tokens = LEAD + patches;
         let mut exec = Exec::new(kernels, threads, widest)?;
-        let mut given = vec![0.0; (2 + patches) * w];
-        let (genre, rest) = given.split_at_mut(w);
-        let (source, audio) = rest.split_at_mut(w);
+        let mut given = vec![0.0; 2 * w];
+        let (genre, source) = given.split_at_mut(w);
         let chosen = heard.genre.map_or(UNKNOWN, usize::from).min(UNKNOWN);
         genre.copy_from_slice(&self.genres[chosen * w..][..w]);
         add(genre, self.slot(1));
@@ -146,14 +147,20 @@ impl Network {
         exec.linear(&self.sources[0], &source_row(heard.place), 1, &mut hidden, Epilogue::Gelu);
         exec.linear(&self.sources[1], &hidden, 1, source, Epilogue::Store);
         add(source, self.slot(2));
-        exec.linear(&self.audio_in, &self.ears(heard), patches, audio, Epilogue::Store);
-        self.place(audio, 3);
+        let mut told = vec![0.0; patches * w];
+        exec.linear(&self.audio_in, &self.ears(heard), patches, &mut told, Epilogue::Store);
+        for (patch, wave) in told.chunks_exact_mut(w).zip(self.waves.chunks_exact(w)) {
+            for part in [wave, self.slot(3), genre, source] {
+                add(patch, part);
+            }
+        }
         Ok(Work {
             exec,
             pass: Pass::new(Sizes { width: w, heads, hidden: w * mlp }, tokens, &self.rope),
             cache: KvCache::new(1, tokens, heads, w, KvDtype::F32),
             spans: vec![Span { ring: 0, first: 0, len: tokens as u32 }; tokens],
             given,
+            told,
         })
     }
 
@@ -170,15 +177,6 @@ impl Network {
         out
     }
 
-    /// Adds each patch's place in time and a slot to its token.
-    fn place(&self, tokens: &mut [f32], slot: usize) {
-        let w = self.config.width;
-        for (token, wave) in tokens.chunks_exact_mut(w).zip(self.waves.chunks_exact(w)) {
-            add(token, wave);
-            add(token, self.slot(slot));
-        }
-    }
-
     /// The clean motion, standardised, `[T, D]`, of the noisy `x` at diffusion step `time`.
     ///
     /// # Panics
@@ -186,8 +184,8 @@ impl Network {
     pub(super) fn clean(&self, work: &mut Work, x: &[f32], time: usize, out: &mut [f32]) {
         assert!(x.len() == self.size() && out.len() == self.size(), "a clip's motion");
         let (w, patches) = (self.config.width, self.patches());
-        let tokens = LEAD + 2 * patches;
-        let Work { exec, pass, cache, spans, given } = work;
+        let tokens = LEAD + patches;
+        let Work { exec, pass, cache, spans, given, told } = work;
         pass.clear();
         for _ in 0..tokens {
             // Position 0 turns nothing: tokens know their time from their waves.
@@ -196,20 +194,22 @@ impl Network {
         let mut hidden = vec![0.0; w];
         exec.linear(&self.steps[0], &wave(time, w), 1, &mut hidden, Epilogue::Store);
         exec.silu(&mut hidden);
-        let step = pass.input(0..1);
-        exec.linear(&self.steps[1], &hidden, 1, step, Epilogue::Store);
-        add(step, self.slot(0));
-        pass.input(1..tokens - patches).copy_from_slice(given);
-        let motion = pass.input(tokens - patches..tokens);
+        let mut step = vec![0.0; w];
+        exec.linear(&self.steps[1], &hidden, 1, &mut step, Epilogue::Store);
+        add(&mut step, self.slot(0));
+        pass.input(0..1).copy_from_slice(&step);
+        pass.input(1..LEAD).copy_from_slice(given);
+        let motion = pass.input(LEAD..tokens);
         exec.linear(&self.motion_in, x, patches, motion, Epilogue::Store);
-        self.place(motion, 4);
+        add(motion, told);
+        motion.chunks_exact_mut(w).for_each(|patch| add(patch, &step));
         pass.run(exec, &self.layers, &self.norms, None, &mut |exec, _, qkv, out| {
             for (i, row) in qkv.chunks_exact(3 * w).enumerate() {
                 cache.write(0, i as u64, &row[w..2 * w], &row[2 * w..]);
             }
             exec.attend(qkv, 3 * w, cache, spans, out);
         });
-        pass.read(exec, &self.norms, tokens - patches..tokens);
+        pass.read(exec, &self.norms, LEAD..tokens);
         pass.project(exec, &self.out, out);
     }
 }

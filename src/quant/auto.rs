@@ -193,7 +193,7 @@ impl<'a> Meter<'a> {
     /// decoder.
     fn measure(&self, weights: &[(&Layer, StoredWeights)], teachers: &[Teacher]) -> Result<f64> {
         // As an int8 bundle: there nothing but the matrices changes.
-        let bytes = write::bundle(self.file, self.reference, weights, Scheme::I8)?;
+        let bytes = write::bundle(self.file, Some(self.reference), weights, Scheme::I8)?;
         let engine = Engine::from_file(&BundleFile::from_bytes(bytes, self.file.path()), self.reference.kernels())?;
         teachers.iter().try_fold(0.0, |worst: f64, teacher| {
             let forced = teacher.compare(&engine)?;

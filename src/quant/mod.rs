@@ -43,9 +43,11 @@ pub use scene::Scene;
 pub use teacher::{Forced, FrameError, Teacher};
 
 use crate::bundle::{BundleFile, StoredWeights, Tensors};
-use crate::config::{Config, Quantisation};
+use crate::config::{Config, Kind, Quantisation};
+use crate::engine::Engine;
 use crate::error::{Error, ErrorKind, Result};
-use crate::kernels::Scheme;
+use crate::kernels::{Kernels, Scheme};
+use crate::mospa::Reactor;
 use std::collections::BTreeMap;
 
 /// What to do with the weights.
@@ -85,27 +87,33 @@ pub fn quantise(file: &BundleFile<'_>, options: &Options<'_>) -> Result<Quantise
     let (config, tensors) = file.parse()?;
     refuse_twice(&config, &tensors, options.scheme).map_err(|e| e.with_path(file.path()))?;
     // Everything that loading checks holds from here on.
-    let reference = crate::engine::Engine::from_file(file, crate::kernels::Kernels::detect()?)?;
+    let kernels = Kernels::detect()?;
+    let reference = match config.kind {
+        // It has no sessions.
+        Kind::Mospa => Reactor::load(file, kernels).map(|_| None)?,
+        _ => Some(Engine::from_file(file, kernels)?),
+    };
+    // Statistics and sensitivity are measured on latents.
+    let sessions = || {
+        reference.as_ref().filter(|engine| engine.sarah().is_ok()).ok_or_else(|| {
+            let kind = config.kind.name();
+            argument(format!(
+                "calibration and budgets are for bundles of the kind `sarah`; leave them out for `{kind}`"
+            ))
+        })
+    };
     let layers = layers(&tensors)?;
     let schemes = keep::apply(options, &layers)?;
-    if options.calibration.is_some() || options.budget.is_some() {
-        // Statistics and sensitivity are measured on latents.
-        reference.sarah().map_err(|_| {
-            argument(
-                "calibration and budgets are for bundles of the kind `sarah`; leave them out for `dram`".to_owned(),
-            )
-        })?;
-    }
-    let calibration = options.calibration.map(|scene| Calibration::new(&reference, scene)).transpose()?;
+    let calibration = options.calibration.map(|scene| Calibration::new(sessions()?, scene)).transpose()?;
     let rounder = Rounder { layers: &layers, calibration: calibration.as_ref() };
     let (schemes, choice) = match options.budget {
         None => (schemes, None),
         Some(budget) => {
-            let (schemes, choice) = auto::choose(file, &reference, &rounder, schemes, options.keep, budget)?;
+            let (schemes, choice) = auto::choose(file, sessions()?, &rounder, schemes, options.keep, budget)?;
             (schemes, Some(choice))
         }
     };
-    let bytes = write::bundle(file, &reference, &rounder.all(&schemes)?, options.scheme)?;
+    let bytes = write::bundle(file, reference.as_deref(), &rounder.all(&schemes)?, options.scheme)?;
     Ok(Quantised { bytes, schemes, choice })
 }
 

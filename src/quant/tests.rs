@@ -110,3 +110,23 @@ fn nearest_plane_beats_nearest_on_correlated_inputs() {
     }
     assert_eq!(nearest_plane::factor(&[0.0; 4], 2), None, "a layer that nothing runs through");
 }
+
+#[test]
+fn whole_clip_bundles_are_quantised_and_run() {
+    let bundle = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/goldens/mospa.safetensors");
+    let file = BundleFile::open(bundle).unwrap();
+    let options = Options { scheme: Scheme::I8, smallest: 0, keep: &[], calibration: None, budget: None };
+    let quantised = quantise(&file, &options).unwrap();
+    assert!(quantised.schemes.values().all(|scheme| *scheme == Scheme::I8));
+    let small = BundleFile::from_bytes(quantised.bytes, "small");
+    let kernels = Kernels::detect().unwrap();
+    let [a, b] = [&file, &small].map(|file| {
+        let reactor = Reactor::load(file, kernels).unwrap();
+        let ear = vec![0.3; reactor.frames() * 132];
+        let heard = crate::mospa::Heard { left: &ear, right: &ear, place: Some([1.0, 1.0, 2.0]), genre: Some(1) };
+        reactor.clean(&heard, &reactor.noise(1), 999).unwrap()
+    });
+    let square = |x: &mut dyn Iterator<Item = f32>| x.map(|v| v * v).sum::<f32>();
+    let off = square(&mut a.iter().zip(&b).map(|(a, b)| a - b)) / square(&mut a.iter().copied());
+    assert!(off > 0.0 && off < 0.01, "{off}");
+}

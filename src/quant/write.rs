@@ -16,11 +16,12 @@ use std::collections::BTreeMap;
 /// is f16 too, but for what [`stays`] names.
 pub(super) fn bundle(
     file: &BundleFile<'_>,
-    reference: &Engine,
+    reference: Option<&Engine>,
     weights: &[(&Layer, StoredWeights)],
     asked: Scheme,
 ) -> Result<Vec<u8>> {
     let (json, tensors) = file.raw()?;
+    let idle = reference.and_then(|engine| engine.sarah().ok().map(|sarah| (engine, sarah)));
     let mut entries: Vec<Entry> = Vec::new();
     let mut record = Quantisation { scheme: asked, tensors: BTreeMap::new() };
     for (layer, stored) in weights {
@@ -29,16 +30,16 @@ pub(super) fn bundle(
     }
     for (name, view) in tensors.iter().filter(|(name, _)| !record.tensors.contains_key(*name)) {
         let shape = view.shape().to_vec();
-        let entry = match (name, view.dtype()) {
-            (IDLE_FRAMES, _) if reference.sarah().is_ok() => {
-                let shape = vec![reference.idle_blocks(), reference.config().vae.latent];
-                (IDLE_LATENTS.to_owned(), Dtype::F32, shape, floats(reference.sarah()?.idle.values()))
+        let entry = match (name, view.dtype(), idle) {
+            (IDLE_FRAMES, _, Some((engine, sarah))) => {
+                let shape = vec![engine.idle_blocks(), engine.config().vae.latent];
+                (IDLE_LATENTS.to_owned(), Dtype::F32, shape, floats(sarah.idle.values()))
             }
-            (_, Dtype::F32) if asked == Scheme::F16 && !stays(name, &record) => match narrowed(view.data()) {
+            (_, Dtype::F32, _) if asked == Scheme::F16 && !stays(name, &record) => match narrowed(view.data()) {
                 Some(halves) => (name.to_owned(), Dtype::F16, shape, halves),
                 None => (name.to_owned(), Dtype::F32, shape, view.data().to_vec()),
             },
-            (_, dtype) => (name.to_owned(), dtype, shape, view.data().to_vec()),
+            (_, dtype, _) => (name.to_owned(), dtype, shape, view.data().to_vec()),
         };
         entries.push(entry);
     }

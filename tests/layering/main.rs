@@ -78,7 +78,7 @@ const ROOMS: &[(&str, &str, &[&str])] = &[
     (
         "quant",
         "smaller bundles",
-        &["bundle", "config", "engine", "error", "frame", "kernels", "normaliser", "pose", "session", "vae"],
+        &["bundle", "config", "engine", "error", "frame", "kernels", "mospa", "normaliser", "pose", "session", "vae"],
     ),
 ];
 

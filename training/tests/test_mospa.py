@@ -253,6 +253,20 @@ def test_training_learns_resumes_and_exports(tmp_path, monkeypatch):
     assert "CMU" in settings["licence"].upper() and "RSAIT" in settings["licence"] and all(torch.equal(a, b) for a, b in zip(net.parameters(), out.parameters()))
 
 
+def test_a_step_follows_the_motion_before_feet_and_way(tmp_path):
+    fake_corpus(tmp_path)
+    torch.manual_seed(0)
+    split, net = data.Split(tmp_path, "train"), nets.Mospa(**nets.SIZES | {"width": 16, "heads": 2, "layers": 1})
+    for name, value in split.statistics().items():
+        getattr(net, name).copy_(value)
+    given, clean = split.given(net, [0, 7, 2]), net.standardise(torch.from_numpy(split.poses([0, 7, 2])))
+    torch.nn.init.normal_(net.out.weight, 0, 0.02)
+    loss, parts = train.losses(net, net(torch.randn_like(clean), torch.tensor([999] * 3), *given), clean)
+    flat = lambda of: torch.cat([g.flatten() for g in torch.autograd.grad(of, list(net.parameters()), retain_graph=True)])
+    whole, plain = flat(loss), flat(parts["plain"])
+    assert whole @ plain > 0.3 * whole.norm() * plain.norm() and whole.norm() < 5 * plain.norm()
+
+
 def test_measures_tell_right_from_wrong():
     rng = np.random.default_rng(0)
     f = rng.standard_normal((40, 48))

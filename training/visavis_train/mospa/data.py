@@ -5,7 +5,19 @@ import os
 import numpy as np
 import torch
 
+from ..motion import rig
 from . import layout, nets, react
+
+AFTER = 1.5                                # s after the onset at which a body has turned
+
+
+def off_source(x, clip, place):
+    """Angle [rad] from the hips' heading to the source, as the body is AFTER the onset; and its bearing at the onset."""
+    p, r = layout.to_world(x)
+    at, first = int(30 * (clip["onset"] + AFTER)), int(30 * clip["onset"])
+    bearing = lambda t: rig.wrap(np.arctan2(place[0] - p[t, 0, 0], place[2] - p[t, 0, 2]) - rig.yaw_of(r[t, 0]))
+    turned = rig.wrap(rig.yaw_of(r[at, 0]) - rig.yaw_of(r[first, 0]))
+    return abs(bearing(at)), bearing(first), turned
 
 
 class Split:

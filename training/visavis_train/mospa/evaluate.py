@@ -16,10 +16,9 @@ from scipy.linalg import sqrtm
 from ..motion import rig
 from ..train.common import mixed
 from . import diffusion, extractor, layout, nets, react, train
-from .data import Split
+from .data import Split, off_source
 
 POOL, PAIRS, DRAWS = 32, 64, 20
-AFTER = 1.5                                # s after the onset at which a body has turned
 
 
 def r_precision(conditions, motions, rng):
@@ -49,15 +48,6 @@ def apd(x):
     flat = x.reshape(len(x), -1)
     d = torch.cdist(flat, flat)
     return float(d.sum() / (len(x) * (len(x) - 1)))
-
-
-def off_source(x, clip, place):
-    """Angle [rad] from the hips' heading to the source, as the body is AFTER the onset; and its bearing at the onset."""
-    p, r = layout.to_world(x)
-    at, first = int(30 * (clip["onset"] + AFTER)), int(30 * clip["onset"])
-    bearing = lambda t: rig.wrap(np.arctan2(place[0] - p[t, 0, 0], place[2] - p[t, 0, 2]) - rig.yaw_of(r[t, 0]))
-    turned = rig.wrap(rig.yaw_of(r[at, 0]) - rig.yaw_of(r[first, 0]))
-    return abs(bearing(at)), bearing(first), turned
 
 
 def reaction_time(x, clip):

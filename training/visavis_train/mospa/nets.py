@@ -43,7 +43,7 @@ class Mospa(nn.Module):
         self.source1, self.source2 = nn.Linear(5, width), nn.Linear(width, width)
         self.audio = nn.Linear(patch * 2 * features.SIZE, width)
         self.motion = nn.Linear(patch * layout.SIZE, width)
-        self.slots = nn.Parameter(torch.randn(5, width) * 0.02)
+        self.slots = nn.Parameter(torch.randn(4, width) * 0.02)
         self.layers = nn.ModuleList(Layer(width, heads, mlp) for _ in range(layers))
         for layer in self.layers:
             layer.attn = Full(width, heads)
@@ -73,9 +73,11 @@ class Mospa(nn.Module):
         b, s = len(x), self.slots
         when = wave(torch.arange(self.frames // self.patch, device=x.device), self.width)
         patches = lambda v: v.reshape(b, -1, self.patch * v.shape[-1])
-        tokens = [(self.step2(nn.functional.silu(self.step1(wave(t, self.width)))) + s[0])[:, None], (self.genre[genre] + s[1])[:, None],
-                  (self.source2(gelu(self.source1(row))) + s[2])[:, None], self.audio(patches(heard)) + when + s[3], self.motion(patches(x)) + when + s[4]]
+        lead = [(self.step2(nn.functional.silu(self.step1(wave(t, self.width)))) + s[0])[:, None], (self.genre[genre] + s[1])[:, None],
+                (self.source2(gelu(self.source1(row))) + s[2])[:, None]]
+        # a patch hears its own sound and is told of the rest at once: by attention alone that takes thousands of steps to learn
+        tokens = [*lead, self.motion(patches(x)) + self.audio(patches(heard)) + when + s[3] + sum(lead)]
         h = torch.cat(tokens, 1)
         for layer in self.layers:
             h = layer(h, None)
-        return self.out(self.ln_f(h[:, -(self.frames // self.patch):])).reshape(x.shape)
+        return self.out(self.ln_f(h[:, len(lead):])).reshape(x.shape)
