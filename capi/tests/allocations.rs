@@ -61,7 +61,7 @@ fn pushing_allocates_nothing_after_the_first() {
                 visavis_session_report_block_time(session, 1.0),
             ]
         };
-        assert_eq!(all, [VisavisStatus::Ok; 12]);
+        assert_eq!(all, [VisavisStatus::Ok; 14]);
     };
     assert!(calls(|| push(1)) > 0, "the first makes resamplers, and the allocator counts");
     assert_eq!(calls(|| (1..500).for_each(push)), 0);

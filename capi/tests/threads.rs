@@ -55,7 +55,7 @@ fn two_push_from_one_buffer_while_a_third_polls() {
                             visavis_session_report_block_time(session, 1.0),
                         ]
                     };
-                    assert_eq!(all, [VisavisStatus::Ok; 15]);
+                    assert_eq!(all, [VisavisStatus::Ok; 17]);
                 }
             });
         }
