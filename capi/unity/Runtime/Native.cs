@@ -42,6 +42,7 @@ namespace Visavis
         [DllImport(Library)] public static extern Status visavis_session_end_sound(SessionHandle session, uint id);
         [DllImport(Library)] public static extern Status visavis_session_push_ears(SessionHandle session, IntPtr left, IntPtr right, UIntPtr count, uint rate);
         [DllImport(Library)] public static extern Status visavis_session_end_ears(SessionHandle session);
+        [DllImport(Library)] public static extern Status visavis_session_heard_place(SessionHandle session, [Out] float[] position, out int known);
         [DllImport(Library)] public static extern Status visavis_session_set_sensitivity(SessionHandle session, float sensitivity);
         [DllImport(Library)] public static extern Status visavis_session_set_gaze(SessionHandle session, float target);
         [DllImport(Library)] public static extern Status visavis_session_set_natural_gaze(SessionHandle session);

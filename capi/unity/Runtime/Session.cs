@@ -156,6 +156,20 @@ namespace Visavis
         /// <exception cref="ArgumentException">The bundle has no hearing.</exception>
         public void EndEars() => Errors.Check(Native.visavis_session_end_ears(handle));
 
+        /// <summary>
+        /// Where the last block took what stands out among the sounds to be, session world: the place of a source, or the direction that was estimated of what
+        /// PushEars brought, 2 m away and 1.5 m over the floor. False while nothing is known.
+        /// </summary>
+        public bool HeardPlace(out float x, out float y, out float z)
+        {
+            var position = new float[3];
+            Errors.Check(Native.visavis_session_heard_place(handle, position, out var known));
+            x = position[0];
+            y = position[1];
+            z = position[2];
+            return known != 0;
+        }
+
         /// <summary>How much the agent minds sounds in the room: -1 dull, 0 neutral, 1 sensitive, up to 1.5 either way.</summary>
         public void SetSensitivity(float sensitivity) => Errors.Check(Native.visavis_session_set_sensitivity(handle, sensitivity));
 
