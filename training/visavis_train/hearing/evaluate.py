@@ -139,11 +139,31 @@ def silenced(w, sound):
     return out
 
 
-def alarms(run, judge, seed=0):
-    """Reactions that the judge sees in ten minutes of roll-outs in which nothing sounds, towards places drawn as sounds' are."""
+def quiet(corpus, split):
+    """Positions [B, SEEN, J, 3] and roots of the corpus' stretches in which nothing sounds and nobody reacts, a second after that at the earliest."""
+    from ..train.data import Split, expand
+    clips, out = Split(corpus, split), []
+    for i, path in enumerate(clips.paths):
+        first, frames = int(clips.starts[i]), int(clips.starts[i + 1] - clips.starts[i])
+        busy = np.zeros(frames, bool)
+        for e in json.loads(store.load(path, False).meta["events"]):
+            busy[e["onset"]:max(e["until"], e["end"]) + 30] = True
+        t = 0
+        while t + SEEN <= frames:
+            if busy[t:t + SEEN].any():
+                t += 10
+                continue
+            x, roots = expand(clips.frames[first + t:first + t + SEEN]), clips.roots[first + t:first + t + SEEN]
+            out.append((to_world(roots, local_positions(x).double()), roots))
+            t += SEEN
+    return [torch.stack(part) for part in zip(*out)]
+
+
+def alarms(run, judge, begin=0, seed=0):
+    """Reactions that the judge sees in ten minutes of motion, from frame `begin` on, in which nothing sounds, towards places drawn as sounds' are."""
     positions, roots = run[:2]
     rng, told = np.random.default_rng(seed), []
-    for first in range(4 * BEFORE, positions.shape[1] - SEEN, SEEN):
+    for first in range(begin, positions.shape[1] - SEEN + 1, SEEN):
         onset = torch.full((len(positions),), first)
         angle, far = rng.uniform(-np.pi, np.pi, len(positions)), rng.uniform(1, 5, len(positions))
         near = roots[:, first]
@@ -240,7 +260,8 @@ def main():
     for name, hears in (("model", "sounds"), ("without sounds", "nothing"), ("silence", "silence")):
         parts = [roll(b, w, chosen[i:i + 40], args.student, i, hears) for i in range(0, len(chosen), 40)]
         run = [torch.cat(p) for p in zip(*parts)]
-        out[name] = figures(run, chosen, judge) if hears != "silence" else alarms(run, judge)
+        out[name] = figures(run, chosen, judge) if hears != "silence" else alarms(run, judge, 4 * BEFORE)
+    out["quiet corpus"] = alarms(quiet(args.corpus, args.split), judge)
     with open(args.out, "w") as f:
         json.dump(out, f, indent=1)
     print(json.dumps(out, indent=1))
