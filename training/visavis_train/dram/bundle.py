@@ -2,11 +2,11 @@
 import json
 from dataclasses import dataclass
 
-import torch
 from safetensors import safe_open
 
 from .. import bundle as bundles
 from ..nets.audio import AudioEncoder
+from ..nets.lstm import packed, unpacked
 from .nets import Dram
 from .pose import Layout
 
@@ -23,11 +23,8 @@ def tensors_of(net):
                 value = value.permute(0, 2, 1) if value.dim() == 3 else value
                 out[f"{part}.{name}"] = value.detach().float().contiguous()
         if net.kind == "lstm":
-            lstm = module.lstm
-            for i in range(lstm.num_layers):
-                get = lambda n: getattr(lstm, f"{n}_l{i}").detach().float()
-                out[f"{part}.lstm.{i}.weight"] = torch.cat([get("weight_ih"), get("weight_hh")], 1)
-                out[f"{part}.lstm.{i}.bias"] = get("bias_ih") + get("bias_hh")
+            for i in range(module.lstm.num_layers):
+                out[f"{part}.lstm.{i}.weight"], out[f"{part}.lstm.{i}.bias"] = packed(module.lstm, i)
     return out
 
 
@@ -39,10 +36,9 @@ def fill(net, tensors):
         if name in STATS:
             continue
         if rest.startswith("lstm."):
-            which, i = rest[len("lstm."):].rsplit("_l", 1)
-            w, b = tensors[f"{part}.lstm.{i}.weight"].float(), tensors[f"{part}.lstm.{i}.bias"].float()
-            half = w.shape[1] // 2
-            state[name] = {"weight_ih": w[:, :half], "weight_hh": w[:, half:], "bias_ih": b, "bias_hh": torch.zeros_like(b)}[which]
+            which = rest.removeprefix("lstm.")
+            i = which.rsplit("_l", 1)[1]
+            state[name] = unpacked(tensors[f"{part}.lstm.{i}.weight"], tensors[f"{part}.lstm.{i}.bias"], i)[which]
         else:
             t = tensors[name].float()
             state[name] = t.permute(0, 2, 1) if value.dim() == 3 else t

@@ -19,6 +19,7 @@ from ..motion import rig
 from ..mospa.react import REACTIONS, TURNS
 from ..nets.flow import GAZE
 from ..nets.stream import DecoderStream, Stream
+from ..train.data import Split, expand
 from ..train.geometry import gaze, integrate, local_axes, local_positions, to_local, to_world
 from ..train.windows import Windows
 from . import ears
@@ -141,7 +142,6 @@ def silenced(w, sound):
 
 def quiet(corpus, split):
     """Positions [B, SEEN, J, 3] and roots of the corpus' stretches in which nothing sounds and nobody reacts, a second after that at the earliest."""
-    from ..train.data import Split, expand
     clips, out = Split(corpus, split), []
     for i, path in enumerate(clips.paths):
         first, frames = int(clips.starts[i]), int(clips.starts[i + 1] - clips.starts[i])
@@ -182,7 +182,6 @@ def facing(x, roots):
 
 def truth(w, corpus_split, chosen, b):
     """The corpus' own motion of the windows, as `roll` gives it."""
-    from ..train.data import Split, expand
     clips = Split(*corpus_split)
     frames = torch.stack([c[0][1] + 4 * c[1] + torch.arange(4 * BLOCKS) for c in chosen])
     x, roots = expand(clips.frames[frames]), clips.roots[frames]

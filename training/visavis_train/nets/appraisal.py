@@ -3,6 +3,7 @@ import torch
 from torch import nn
 
 from .layers import gelu
+from .lstm import packed, unpacked
 
 
 class Appraisal(nn.Module):
@@ -31,16 +32,13 @@ class Appraisal(nn.Module):
         return torch.cat([features, logits.softmax(-1)], -1)
 
     def tensors(self):
-        """Under the bundle's names: the cells' two matrices side by side, one bias."""
-        s = {k: v.detach().float() for k, v in self.state_dict().items()}
-        out = {f"appraisal.{k}": v.contiguous() for k, v in s.items() if not k.startswith("lstm.")}
-        out["appraisal.lstm.weight"] = torch.cat([s["lstm.weight_ih_l0"], s["lstm.weight_hh_l0"]], 1).contiguous()
-        return out | {"appraisal.lstm.bias": s["lstm.bias_ih_l0"] + s["lstm.bias_hh_l0"]}
+        """Under the bundle's names."""
+        out = {f"appraisal.{k}": v.detach().float() for k, v in self.state_dict().items() if not k.startswith("lstm.")}
+        return out | dict(zip(("appraisal.lstm.weight", "appraisal.lstm.bias"), packed(self.lstm)))
 
     def fill(self, tensors):
         """The inverse of `tensors`."""
         t = {k.removeprefix("appraisal."): v.float() for k, v in tensors.items() if k.startswith("appraisal.")}
-        ih, hh = t.pop("lstm.weight").split(self.width, 1)
-        bias = t.pop("lstm.bias")
-        self.load_state_dict(t | {"lstm.weight_ih_l0": ih, "lstm.weight_hh_l0": hh, "lstm.bias_ih_l0": bias, "lstm.bias_hh_l0": torch.zeros_like(bias)})
+        cells = unpacked(t.pop("lstm.weight"), t.pop("lstm.bias"))
+        self.load_state_dict(t | {f"lstm.{k}": v for k, v in cells.items()})
         return self.eval()

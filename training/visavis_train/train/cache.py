@@ -82,7 +82,8 @@ def features(audio, clip, frames):
 @torch.no_grad()
 def rooms(clips, encoder, gaze, appraisal=None):
     """What was heard in the room in each clip: features [N, D_s] f16, levels [N, 2], source [N, 3], known [N], where the body reacts [N], sensitivity
-    [clips], features of silence [D_s]. With an `appraisal` its shares of reactions are behind the features; and the gaze score [N], its mean elsewhere in the clip while the body reacts: a target is for conversation."""
+    [clips], features of silence [D_s]; and the gaze score [N], its mean elsewhere in the clip while the body reacts: a target is for conversation. With an
+    `appraisal` its shares of the reactions are behind the features."""
     frames, told = [], gaze.clone()
     sensitivity = torch.zeros(len(clips))
     for i, path in enumerate(clips.paths):
@@ -186,6 +187,8 @@ def main():
     args = parser.parse_args()
     if not (args.corpus or args.join):
         parser.error("give --corpus, or --join with caches")
+    if args.appraisal and not args.hearing:
+        parser.error("--appraisal needs --hearing")
     device, team = common.start_process(args), Team(args.workers)
     os.makedirs(args.out, exist_ok=True)
     if args.join:
