@@ -218,6 +218,10 @@ pub struct HearingConfig {
     pub embed: usize,
     /// What is made of what is heard.
     pub appraisal: AppraisalConfig,
+    /// How many times as far guidance goes while a sound is reacted to: `weight - 1` is multiplied
+    /// by it. 1 changes nothing.
+    #[serde(default = "unscaled")]
+    pub guidance: f32,
 }
 
 /// Which reaction a sound calls for.
@@ -225,8 +229,13 @@ pub struct HearingConfig {
 pub struct AppraisalConfig {
     /// LSTM cells.
     pub width: usize,
-    /// Names of the reactions.
+    /// Names of the reactions; [`AppraisalConfig::NONE`] is that to go on as if nothing sounded.
     pub reactions: Vec<String>,
+}
+
+impl AppraisalConfig {
+    /// Name of the reaction that is none.
+    pub const NONE: &str = "stay";
 }
 
 impl HearingConfig {

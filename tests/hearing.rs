@@ -4,7 +4,9 @@
 
 mod common;
 
-use common::{HEARING, Inputs, TOLD, hearing, hearing_in, motion_of, noise, poll_blocks, run, tiny};
+use common::{
+    HEARING, Inputs, TOLD, guided_hearing_bytes, hearing, hearing_in, motion_of, noise, poll_blocks, run, tiny,
+};
 use glam::Vec3;
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -682,6 +684,25 @@ fn blocks_that_are_held_hear_nothing_and_those_after_them_do() {
     assert!(held > 5 && late == held + 1, "{held} held, {late} unheard");
     assert!(stages.is_known(59));
     assert_eq!(session.stats().inputs.sounds.started, 1);
+}
+
+#[test]
+fn guidance_goes_further_while_a_sound_is_reacted_to() {
+    let engine = |guidance| Engine::from_bytes(guided_hearing_bytes(guidance), "tiny with hearing").unwrap();
+    let play = |engine: &Arc<Engine>, guidance| {
+        let options = SessionOptions { guidance, ..Default::default() };
+        play(&mut engine.session(options).unwrap(), &sounds()).0
+    };
+    let (usual, further) = (engine(1.0), engine(3.0));
+    let (a, b) = (play(&usual, None), play(&further, None));
+    // The first sounds are pushed before block 3; block 4 is the first that knows of them.
+    assert_eq!(a[..16], b[..16]);
+    assert_ne!(a[16..], b[16..]);
+    assert_eq!(play(&usual, Some(1.0)), play(&further, Some(1.0)), "no guidance goes no further");
+    for guidance in [-0.1, 20.5] {
+        let e = Engine::from_bytes(guided_hearing_bytes(guidance), "tiny").map(drop).unwrap_err();
+        assert_eq!(e.kind(), ErrorKind::BundleInvalid, "{guidance}: {e}");
+    }
 }
 
 #[test]

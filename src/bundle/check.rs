@@ -130,6 +130,7 @@ fn sarah(c: &Config) -> Result<()> {
         within("hearing.embed", h.embed, 1, 4096)?;
         within("hearing.appraisal.width", h.appraisal.width, 1, 1024)?;
         within("hearing.appraisal.reactions", h.appraisal.reactions.len(), 1, 64)?;
+        real("hearing.guidance", h.guidance, 0.0, 20.0)?;
         // What was heard is heard at the head of the frames before.
         within("user_delay_blocks", c.user_delay_blocks as usize, 1, 1)?;
     }

@@ -12,6 +12,16 @@ pub struct Guidance {
     pub gaze: f32,
 }
 
+impl Guidance {
+    /// The weights while what is heard calls for a reaction, by `share` 0 to 1, `further` being how
+    /// many times as far guidance goes then: `weight - 1` grows to `further (weight - 1)`. So no
+    /// guidance remains none, and with a share of 0 nothing changes, to the bit.
+    #[must_use]
+    pub fn reacting(self, share: f32, further: f32) -> Self {
+        Self { weight: self.weight + share * (further - 1.0) * (self.weight - 1.0), ..self }
+    }
+}
+
 /// The networks that a generator runs, one of them at least.
 #[derive(Debug, Clone, Copy)]
 pub struct Nets<'a> {

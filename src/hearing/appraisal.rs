@@ -61,6 +61,8 @@ pub(super) struct Appraisal {
     hidden: Vec<f32>,
     /// `[4, reactions]`.
     shares: Vec<f32>,
+    /// Which of the reactions is none.
+    none: Option<usize>,
 }
 
 impl Appraisal {
@@ -77,6 +79,7 @@ impl Appraisal {
             cell: zeros(width),
             hidden: zeros(width),
             shares: zeros(BLOCK_FRAMES * reactions),
+            none: config.appraisal.reactions.iter().position(|name| name == AppraisalConfig::NONE),
         }
     }
 
@@ -95,7 +98,7 @@ impl Appraisal {
         levels: &[f32],
         sensitivity: f32,
     ) {
-        let Self { rows, h, pair, gates, cell, hidden, shares } = self;
+        let Self { rows, h, pair, gates, cell, hidden, shares, .. } = self;
         let (inputs, width) = (rows.len() / BLOCK_FRAMES, cell.len());
         let frames = features.chunks_exact(inputs - BESIDE).zip(levels.chunks_exact(2));
         for (row, (features, levels)) in rows.chunks_exact_mut(inputs).zip(frames) {
@@ -120,6 +123,13 @@ impl Appraisal {
     /// Shares of the reactions in the frames that were appraised last, `[4, reactions]`.
     pub(super) fn shares(&self) -> &[f32] {
         &self.shares
+    }
+
+    /// How much of them, 0 to 1, is for a reaction at all.
+    pub(super) fn reaction(&self) -> f32 {
+        let Some(none) = self.none else { return 0.0 };
+        let rows = self.shares.chunks_exact(self.shares.len() / BLOCK_FRAMES);
+        rows.map(|row| 1.0 - row[none]).sum::<f32>() / BLOCK_FRAMES as f32
     }
 }
 

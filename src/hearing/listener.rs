@@ -156,6 +156,11 @@ impl Hearing {
         self.heard
     }
 
+    /// How much it calls for a reaction, 0 to 1; 0 where nothing was listened to.
+    pub fn reaction(&self) -> f32 {
+        if self.heard { self.appraisal.reaction() } else { 0.0 }
+    }
+
     /// What the left and the right ear heard of it, `[2, 3200]` pascals.
     pub fn ears(&self) -> &[f32] {
         self.ears.as_flattened()

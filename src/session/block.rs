@@ -100,7 +100,8 @@ impl Block<'_> {
                     return;
                 }
                 let temperature = options.temperature(&engine.config);
-                maker.generator.begin(plan.sampler, options.guidance(engine), &inputs.condition, |token, eps| {
+                let guidance = options.guidance(engine, inputs.reaction());
+                maker.generator.begin(plan.sampler, guidance, &inputs.condition, |token, eps| {
                     maker.noise.fill(options, temperature, token, eps);
                 });
             }

@@ -296,6 +296,11 @@ impl Inputs {
         self.hearing.as_ref().and_then(|hearing| hearing.place())
     }
 
+    /// How much of what is heard calls for a reaction, 0 to 1.
+    pub(super) fn reaction(&self) -> f32 {
+        self.hearing.as_ref().map_or(0.0, |hearing| hearing.reaction())
+    }
+
     /// The input of sounds in the room.
     pub(super) fn sounds(&self) -> SoundInput {
         self.hearing.as_ref().map_or_else(SoundInput::deaf, |hearing| hearing.input())

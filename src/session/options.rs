@@ -121,12 +121,14 @@ impl SessionOptions {
         }
     }
 
-    pub(super) fn guidance(&self, engine: &Engine) -> Guidance {
+    /// Weights of a block in which what is heard calls for a reaction by `reaction`, 0 to 1.
+    pub(super) fn guidance(&self, engine: &Engine, reaction: f32) -> Guidance {
         let defaults = &engine.config.session;
-        Guidance {
+        let weights = Guidance {
             weight: self.guidance.unwrap_or(defaults.guidance),
             gaze: self.gaze_guidance.unwrap_or(defaults.gaze_guidance),
-        }
+        };
+        engine.config.hearing.as_ref().map_or(weights, |hearing| weights.reacting(reaction, hearing.guidance))
     }
 }
 

@@ -192,7 +192,12 @@ pub const TOLD: usize = HEARING.0 + APPRAISAL.1;
 
 /// The tiny bundle with hearing of random weights; all else is the tiny bundle's.
 pub fn hearing_bytes() -> Vec<u8> {
-    with_hearing(&std::fs::read(golden_path("tiny.safetensors")).expect("the tiny bundle is there"))
+    guided_hearing_bytes(1.0)
+}
+
+/// The same, with guidance that goes `guidance` times as far while it reacts.
+pub fn guided_hearing_bytes(guidance: f32) -> Vec<u8> {
+    with_hearing(&std::fs::read(golden_path("tiny.safetensors")).expect("the tiny bundle is there"), guidance)
 }
 
 /// An engine of [`hearing_bytes`].
@@ -214,7 +219,7 @@ pub fn hearing_in(scheme: Scheme) -> Arc<Engine> {
 }
 
 /// A bundle with hearing, of random weights, put into one without.
-fn with_hearing(bytes: &[u8]) -> Vec<u8> {
+fn with_hearing(bytes: &[u8], guidance: f32) -> Vec<u8> {
     let (_, header) = SafeTensors::read_metadata(bytes).expect("a header");
     let file = SafeTensors::deserialize(bytes).expect("a sound container");
     let mut metadata = header.metadata().clone().expect("metadata");
@@ -228,10 +233,11 @@ fn with_hearing(bytes: &[u8]) -> Vec<u8> {
         })
         .collect();
     let (cells, reactions) = APPRAISAL;
-    let names: Vec<_> = (0..reactions).map(|i| format!("reaction {i}")).collect();
+    let names: Vec<_> =
+        (0..reactions).map(|i| if i == 0 { "stay".to_owned() } else { format!("reaction {i}") }).collect();
     let appraisal = serde_json::json!({"width": cells, "reactions": names});
     config["hearing"] = serde_json::json!(
-        {"audio": {"layers": layers, "features": features}, "embed": embed, "appraisal": appraisal});
+        {"audio": {"layers": layers, "features": features}, "embed": embed, "appraisal": appraisal, "guidance": guidance});
     metadata.insert("visavis".to_owned(), config.to_string());
     let width = config["flow"]["width"].as_u64().expect("a width") as usize;
 

@@ -93,6 +93,7 @@ def main():
     parser.add_argument("--half", action="store_true", help="f16 weights")
     for name in ("guidance", "gaze-guidance", "temperature"):
         parser.add_argument(f"--{name}", type=float, help="default of sessions")
+    parser.add_argument("--reaction-guidance", type=float, default=1.0, help="how many times as far guidance goes while a sound is reacted to [1]")
     args = parser.parse_args()
     if (args.hearing is None) != (args.appraisal is None):
         raise SystemExit("--hearing and --appraisal belong together")
@@ -109,6 +110,8 @@ def main():
                                credits.licence(args.corpus, *args.sources, data=args.data),
                                {k: v for k in ("guidance", "gaze_guidance", "temperature") if (v := getattr(args, k)) is not None},
                                load_audio(args.hearing) if args.hearing else None, appraise.load(args.appraisal) if args.appraisal else None)
+    if args.hearing:
+        config["hearing"]["guidance"] = args.reaction_guidance
     bundle.write(args.out, tensors, config, half=args.half, narrow=NARROW)
     print(f"{args.out}: {os.path.getsize(args.out) / 1e6:.1f} MB")
 

@@ -18,7 +18,7 @@ from ..corpus import store
 from ..motion import rig
 from ..mospa.react import REACTIONS, TURNS
 from ..nets.flow import GAZE
-from ..nets.stream import DecoderStream, Stream
+from ..nets.stream import DecoderStream, Stream, reacting
 from ..train.data import Split, expand
 from ..train.geometry import gaze, integrate, local_axes, local_positions, to_local, to_world
 from ..train.windows import Windows
@@ -102,7 +102,7 @@ def roll(b, w, chosen, student=False, seed=0, hears="sounds"):
         cond.heard.zero_()
     elif hears == "silence":
         cond.sound = hushed
-    frames, n, session = w.frames(segment, at), len(at), b.config["session"]
+    frames, n, session, room = w.frames(segment, at), len(at), b.config["session"], b.config["hearing"]
     cond.flags[..., GAZE] = 1
     settings = dict(student=True, tau=b.config["student"]["tau_history"]) if student else dict(student=False, tau=session["clean_history"]["tau"])
     stream = Stream(b.student if student else b.flow, n, session["guidance"], session["gaze_guidance"], True, 4, settings["tau"], session["clean_history"]["from"], student)
@@ -119,7 +119,8 @@ def roll(b, w, chosen, student=False, seed=0, hears="sounds"):
             cond.user[:, k] = to_local(root, w.user[frames[:, 4 * k:4 * k + 4]][..., [0, 2]].double()).float().flatten(1)
             if hears == "sounds":
                 cond.sound[:, k] = w.room(segment, frames[:, 4 * k:4 * k + 4], root[:, None])[0][:, 0]
-            new = stream.step(eps[:, now], cond.at(now))
+            share = reaction(w, cond.sound[:, k], len(room["appraisal"]["reactions"])) * cond.heard[:, k, 0]
+            new = stream.step(eps[:, now], cond.at(now), reacting(session["guidance"], share, room.get("guidance", 1.0)))
         x = b.unstandardise(decoder.step(placed(new)))
         path = integrate(x[..., :3].double(), root)
         root = path[:, -1]
@@ -130,6 +131,12 @@ def roll(b, w, chosen, student=False, seed=0, hears="sounds"):
     r = b.config["rig"]
     score = gaze(roots.float(), x, user.float(), r["eyes"], r["head_back"])
     return to_world(roots, local_positions(x).double()), roots, score, facing(x, roots)
+
+
+def reaction(w, sound, count):
+    """How much sound vectors [B, S] call for a reaction [B], 0 to 1: shares of all `count` reactions, which are behind the features, but that of the first, none."""
+    frames = sound[:, :4 * w.sound_features].unflatten(1, (4, w.sound_features))
+    return 1 - frames[..., w.sound_features - count].mean(1)
 
 
 def silenced(w, sound):

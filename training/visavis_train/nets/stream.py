@@ -15,7 +15,7 @@ def branches(cond, gaze):
 
 
 def combine(x1, count, guidance, gaze_guidance):
-    """x1 of the stacked branches [count * B, ...] -> guided x1 [B, ...]."""
+    """x1 of the stacked branches [count * B, ...] -> guided x1 [B, ...]; `guidance`: one weight, or one a row [B, 1, 1]."""
     parts = x1.chunk(count)
     out = parts[0] + guidance * (parts[1] - parts[0])
     return out + gaze_guidance * (parts[2] - parts[1]) if count == 3 else out
@@ -26,6 +26,11 @@ def history_time(tau, tau_history=None, clean_from=0.0):
     below `clean_from` and at least `tau_history` from there. Early evaluations decide what happens and listen to the
     conditions; late ones, over a clean past, join it without a jerk."""
     return tau if tau_history is None or tau < clean_from else max(tau, tau_history)
+
+
+def reacting(guidance, share, further):
+    """Guidance weights [B, 1, 1] while what is heard calls for a reaction, by `share` [B] 0 to 1: `guidance - 1` grows to `further` times that."""
+    return guidance + share[:, None, None] * (further - 1) * (guidance - 1)
 
 
 class Sampler:
@@ -154,8 +159,8 @@ class Stream:
             self._pass(slot, torch.cat([done, done], 1), torch.full((1, 2), float(tau), device=self.device), torch.cat([cond, cond], 1))
 
     @torch.no_grad()
-    def step(self, eps, cond):
-        """One block: eps [B, 1, Dz], cond [B, 1, ...] -> z [B, 1, Dz]."""
+    def step(self, eps, cond, guidance=None):
+        """One block: eps [B, 1, Dz], cond [B, 1, ...] -> z [B, 1, Dz]; `guidance`: weights [B, 1, 1] of this block, instead of the stream's."""
         now = self._stack(cond)
         before = self.previous
 
@@ -171,7 +176,8 @@ class Stream:
         if self.single:
             z = rows(eps, 0.0, 0)
         else:
-            z = self.plan.run(eps, lambda z, tau, slot: combine(rows(z, tau, slot), self.count, self.guidance, self.gaze_guidance))
+            weight = self.guidance if guidance is None else guidance
+            z = self.plan.run(eps, lambda z, tau, slot: combine(rows(z, tau, slot), self.count, weight, self.gaze_guidance))
         self.previous = (z, eps, now)
         self.position += 1
         return z
