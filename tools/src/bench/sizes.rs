@@ -58,7 +58,7 @@ impl Size {
     pub fn engine_with_hearing(self, scheme: Scheme, kernels: Kernels, networks: Networks) -> Result<Arc<Engine>> {
         let shapes = [(10, 5), (10, 5), (8, 4), (8, 4), (4, 2), (3, 1)];
         let appraisal = AppraisalConfig { width: 48, reactions: (0..7).map(|i| i.to_string()).collect() };
-        let hearing = HearingConfig { audio: encoder(&shapes, &HEARING, 24), embed: 64, appraisal };
+        let hearing = HearingConfig { audio: encoder(&shapes, &HEARING, 24), embed: 64, appraisal, guidance: 1.0 };
         let config = Config { hearing: Some(hearing), ..self.config() };
         Engine::from_tensors(config, &Tensors::seeded(scheme), kernels, networks)
     }

@@ -34,8 +34,9 @@ def plausible(p):
     return step * rig.FPS < 12.0 and p[..., 1].min() > -0.08 and np.isfinite(p).all()
 
 
-def clip(data, split, index):
-    """Clip `index` of a split: motion [240, 264], ears' features [2, 240, 132], location [3], what is known of it, both ears' sound [2, N]."""
+def scene(data, split, index):
+    """What sounds and what the person does in clip `index` of a split: motion [240, 264], location [3], the source's sound [N] in pascals at 1 m, what is known
+    of it, and the generator for what is drawn after that."""
     heard, moves = sources(data, split)
     order = list(sounds.CLASSES)
     kind, genre = order[index % len(order)], react.GENRES[index // len(order) % 3]
@@ -59,8 +60,14 @@ def clip(data, split, index):
         sound = sound * 10 ** ((sounds.LEVEL[kind] + rng.uniform(-4, 4) - 94) / 20)
         first = onset * features.HOP
         wave[first:first + len(sound)] = sound[:len(wave) - first]
-    both = ears.render(wave, place, ears.draw_room(rng, place), rng)
     told = {"class": kind, "genre": genre, "reaction": reaction, "onset": onset / rig.FPS, "begin": begin, "sound": name, "motion": used}
+    return x, place, wave, told, rng
+
+
+def clip(data, split, index):
+    """Clip `index` of a split: motion [240, 264], ears' features [2, 240, 132], location [3], what is known of it, both ears' sound [2, N]."""
+    x, place, wave, told, rng = scene(data, split, index)
+    both = ears.render(wave, place, ears.draw_room(rng, place), rng)
     return x, np.stack([features.ear(y) for y in both]), place, told, both if index < WAVES else None
 
 

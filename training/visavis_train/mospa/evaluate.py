@@ -98,6 +98,7 @@ def main():
     parser.add_argument("--net", required=True)
     parser.add_argument("--steps", default="4,100,1000")
     parser.add_argument("--also", action="append", default=[], metavar="NAME=CHECKPOINT", help="another network, at the first of --steps")
+    parser.add_argument("--motion", action="append", default=[], metavar="NAME=FILE", help="motion of the test clips [N, 240, 264], .npy (`mospa.streamed`)")
     parser.add_argument("--clips", type=int, help="the first so many test clips [all]")
     parser.add_argument("--out", required=True)
     args = parser.parse_args()
@@ -118,6 +119,8 @@ def main():
 
     add("real", truth)
     add("random", data.poses(np.random.default_rng(1).integers(0, 2 * len(data), len(which)).tolist()))
+    for name, _, path in (m.partition("=") for m in args.motion):
+        add(name, np.load(path)[which])
     net, state = train.load(args.net)
     add("nearest neighbour", nearest(data, held, which, net))
 
