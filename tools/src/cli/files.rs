@@ -10,6 +10,9 @@ const MODELS: [&str; 2] = ["models/visavis-base-i8.safetensors", "models/visavis
 /// The shipped bundle with hearing.
 const ROOM_MODEL: &str = "models/visavis-room-i8.safetensors";
 
+/// The shipped bundle of the kind mospa.
+const CLIP_MODEL: &str = "models/visavis-mospa-i8.safetensors";
+
 /// The bundle to use: `given`, else the shipped one.
 pub fn model(given: Option<&Path>) -> Result<PathBuf> {
     match given {
@@ -27,6 +30,12 @@ pub fn room_model(given: Option<&Path>) -> Result<PathBuf> {
     let advice = "; or name a bundle with hearing by --model (`visavis inspect` tells)";
     let found = given.map_or_else(|| shipped(ROOM_MODEL), |path| Ok(path.to_path_buf()));
     found.map_err(|tried| missing("the model with hearing", &tried, advice))
+}
+
+/// The bundle of the kind mospa to use: `given`, else the shipped one.
+pub fn clip_model(given: Option<&Path>) -> Result<PathBuf> {
+    let found = given.map_or_else(|| shipped(CLIP_MODEL), |path| Ok(path.to_path_buf()));
+    found.map_err(|tried| missing("the model of whole clips", &tried, "; or name a bundle of the kind mospa by --model"))
 }
 
 /// Makes sure that sounds would be heard with the bundle at `model`.

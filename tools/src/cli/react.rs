@@ -1,6 +1,6 @@
 //! `visavis react`: sounds around the agent in, a folder of results out.
 
-use super::print;
+use super::{files, print};
 use clap::builder::{PossibleValuesParser, RangedU64ValueParser};
 use std::path::PathBuf;
 use visavis::internals::kernels::Kernels;
@@ -16,9 +16,9 @@ const SENSITIVITIES: [&str; 3] = ["dull", "neutral", "sensitive"];
 
 #[derive(Debug, Clone, clap::Args)]
 pub struct ReactArgs {
-    /// Bundle of the kind mospa
+    /// Bundle of the kind mospa [default: the shipped one, models/visavis-mospa-i8.safetensors]
     #[arg(long, value_name = "FILE")]
-    pub model: PathBuf,
+    pub model: Option<PathBuf>,
     /// A sound: WAV file, where it is (metres; the agent stands at the origin facing +z, +x is its
     /// left, y is up from the floor) and when it begins (seconds). Up to 16
     #[arg(long, value_name = "WAV@X,Y,Z[:t=S]", required = true)]
@@ -44,7 +44,7 @@ pub fn run(args: &ReactArgs) -> Result<()> {
     let out = OutputFolder::prepare(&args.out)?;
     let sounds = args.sound.iter().map(|text| Sound::read(text)).collect::<Result<Vec<_>>>()?;
     let kernels = Kernels::detect()?;
-    let reactor = Reactor::load(&BundleFile::open(&args.model)?, kernels)?;
+    let reactor = Reactor::load(&BundleFile::open(&files::clip_model(args.model.as_deref())?)?, kernels)?;
     let told = args.sensitivity.as_deref().and_then(|name| SENSITIVITIES.iter().position(|s| *s == name));
     let sensitivity = told.and_then(|i| u8::try_from(i).ok());
     let options = Options { sensitivity, steps: args.steps, seed: args.seed, threads: args.threads };
