@@ -180,11 +180,8 @@ impl Engine {
             return Err(Error::new(ErrorKind::Argument, message));
         }
         let audio_source = AudioSource::load(t, &config.audio, "audio")?;
-        let hearing = config.hearing.as_ref().map(|h| -> Result<_> {
-            let audio = AudioSource::load(t, &h.audio, "hearing")?.pack(kernels, &h.audio)?;
-            Ok(HearingWeights { audio, appraisal: AppraisalWeights::load(t, kernels, h)? })
-        });
         let mut exec = exec(&config, kernels, 1)?;
+        let hearing = config.hearing.as_ref().map(|h| HearingWeights::load(t, kernels, &mut exec, h));
         let model = match &config.dram {
             None => Model::Sarah(Box::new(Sarah::load(t, kernels, &mut exec, &config, networks)?)),
             Some(dram) => {

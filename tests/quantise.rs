@@ -3,12 +3,13 @@
 
 mod common;
 
-use common::{Inputs, golden_path, motion_of, tiny, tiny_f32, tiny_in};
+use common::{Inputs, golden_path, hearing, hearing_bytes, hearing_f32, motion_of, noise, tiny, tiny_f32, tiny_in};
+use safetensors::SafeTensors;
 use std::sync::Arc;
 use visavis::internals::bundle::{TensorInfo, int16_activations};
 use visavis::internals::config::{GazeConfig, GazeCurve};
 use visavis::internals::kernels::{Kernels, Scheme};
-use visavis::internals::quant::{Budget, Keep, Options, Scene, Teacher, quantise};
+use visavis::internals::quant::{Budget, Keep, Options, Scene, Sound, Teacher, quantise};
 use visavis::internals::session::{Anchoring, Diagnostics, GazeControl};
 use visavis::{BundleFile, Engine, ErrorKind, Frame, Sampler, SessionOptions};
 
@@ -37,6 +38,15 @@ fn with_gaze() -> Arc<Engine> {
 fn scene(blocks: usize) -> Scene {
     let inputs = Inputs::circling(4.0, 24_000);
     Scene::new(Some(&inputs.agent), Some(&inputs.user), inputs.path, blocks, Some(0.5)).unwrap()
+}
+
+/// That with two sounds, the first of which begins with block 2.
+fn sounding(blocks: usize) -> Scene {
+    let sound = |id, block, samples, place: [f32; 3]| Sound { id, block, samples, place: place.into() };
+    scene(blocks).with_sounds(vec![
+        sound(1, 2, noise(5, 9_000, 1.5), [-1.0, 0.3, -2.0]),
+        sound(2, 7, noise(6, 5_000, 0.2), [2.0, 0.8, 0.5]),
+    ])
 }
 
 #[test]
@@ -96,6 +106,63 @@ fn the_teacher_runs_as_a_plain_session_does() {
         // A candidate that is forced onto what it would make anyway makes it.
         assert_eq!(teacher.compare(&engine).unwrap().mean_mm(), 0.0);
     }
+}
+
+/// What is damaged of all that hears, shows; without sounds it would not.
+#[test]
+fn sounds_of_a_scene_reach_all_that_hears() {
+    let damaged = |name: &str| {
+        let mut bytes = hearing_bytes();
+        let at = {
+            let file = SafeTensors::deserialize(&bytes).unwrap();
+            let data = file.tensor(name).unwrap().data().as_ptr_range();
+            let start = bytes.as_ptr() as usize;
+            data.start as usize - start..data.end as usize - start
+        };
+        // Weights change their signs.
+        bytes[at].chunks_exact_mut(4).for_each(|v| v[3] ^= 0x80);
+        Engine::from_bytes(bytes, "damaged").unwrap()
+    };
+    for (sampler, net) in [(Sampler::Midpoint4, "flow"), (Sampler::Single, "student")] {
+        let teach = |scene| Teacher::new(&hearing(), scene, sampler, 1, &mut None).unwrap();
+        let (quiet, loud) = (teach(scene(10)), teach(sounding(10)));
+        assert_eq!(loud.compare(&hearing()).unwrap().mean_mm(), 0.0);
+        let frames = |teacher: &Teacher| teacher.frames().cloned().collect::<Vec<_>>();
+        // The block after that in which the first sounded answers it.
+        let (without, with) = (frames(&quiet), frames(&loud));
+        assert!(without[..12] == with[..12] && without[12..16] != with[12..16]);
+        for name in ["hearing.conv.2", "appraisal.lstm", &format!("{net}.embed_sound.0"), &format!("{net}.input_sound")]
+        {
+            let candidate = damaged(&format!("{name}.weight"));
+            let [quiet, loud] = [&quiet, &loud].map(|teacher| teacher.compare(&candidate).unwrap().mean_mm());
+            println!("{sampler}, {name}: {loud} mm");
+            assert!(quiet == 0.0 && loud > 1e-3, "{sampler}, {name}: {quiet} mm, and with sounds {loud}");
+        }
+    }
+}
+
+/// Rounding for the inputs that layers get knows those of what hears.
+#[test]
+fn calibration_hears_the_sounds_of_a_scene() {
+    let rounded = |scene: Option<Scene>| {
+        let options = Options { calibration: scene.as_ref(), ..options(Scheme::I8, &[]) };
+        quantise(&hearing_f32(), &options).unwrap().bytes
+    };
+    let weights = |bytes: &[u8], name: &str| {
+        SafeTensors::deserialize(bytes).unwrap().tensor(&format!("{name}.weight")).unwrap().data().to_vec()
+    };
+    let (plain, quiet, loud) = (rounded(None), rounded(Some(scene(10))), rounded(Some(sounding(10))));
+    for name in ["flow.embed_sound.0", "student.embed_sound.0"] {
+        let [plain, quiet, loud] = [&plain, &quiet, &loud].map(|bytes| weights(bytes, name));
+        assert!(plain == quiet && plain != loud, "{name}");
+    }
+}
+
+/// Who does not hear is told of no sounds.
+#[test]
+fn sounds_of_a_scene_are_for_those_that_hear() {
+    let teach = |scene| Teacher::new(&tiny(), scene, Sampler::Single, 1, &mut None).unwrap();
+    assert!(teach(scene(6)).frames().eq(teach(sounding(6)).frames()));
 }
 
 /// One that is conditioned otherwise cannot be compared.

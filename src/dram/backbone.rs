@@ -8,13 +8,13 @@ use crate::bundle::Tensors;
 use crate::config::{LstmConfig, TcnConfig};
 use crate::error::Result;
 use crate::kernels::{Epilogue, Exec, Kernels, Matrix};
+use crate::nn::Lstm;
 
 /// Layers between the first and the last.
 #[derive(Debug)]
 enum Layers {
     Tcn(Vec<Residual>),
-    /// Gates on input and hidden row.
-    Lstm(Vec<Matrix>),
+    Lstm(Vec<Lstm>),
 }
 
 /// h + fc(gelu(conv(h))).
@@ -40,7 +40,6 @@ pub(super) struct Backbone {
 #[derive(Debug)]
 pub(super) struct Scratch {
     h: Vec<f32>,
-    pair: Vec<f32>,
     inner: Vec<f32>,
 }
 
@@ -48,8 +47,8 @@ impl Scratch {
     /// For up to `agents` rows of any of these.
     pub(super) fn new(backbones: [&Backbone; 2], agents: usize) -> Self {
         let width = backbones.map(|b| b.width).into_iter().max().unwrap_or(0);
-        let [h, pair, inner] = [1, 2, 4].map(|n| vec![0.0; agents * n * width]);
-        Self { h, pair, inner }
+        let [h, inner] = [1, Lstm::SCRATCH].map(|n| vec![0.0; agents * n * width]);
+        Self { h, inner }
     }
 }
 
@@ -86,10 +85,9 @@ impl Backbone {
         [inputs, outputs]: [usize; 2],
         c: &LstmConfig,
     ) -> Result<Self> {
-        let w = c.width;
-        let layer = |i| t.linear(kernels, &format!("{name}.lstm.{i}"), 4 * w, &[2 * w]);
+        let layer = |i| Lstm::load(t, kernels, &format!("{name}.lstm.{i}"), c.width);
         let layers = (0..c.layers).map(layer).collect::<Result<_>>()?;
-        Self::around(t, kernels, name, [inputs, outputs], w, Layers::Lstm(layers))
+        Self::around(t, kernels, name, [inputs, outputs], c.width, Layers::Lstm(layers))
     }
 
     fn around(
@@ -113,7 +111,7 @@ impl Backbone {
             Layers::Tcn(layers) => (layers.as_slice(), &[][..]),
             Layers::Lstm(layers) => (&[][..], layers.as_slice()),
         };
-        let inner = residual.iter().flat_map(|layer| [&layer.conv, &layer.fc]).chain(lstm);
+        let inner = residual.iter().flat_map(|layer| [&layer.conv, &layer.fc]).chain(lstm.iter().map(Lstm::matrix));
         [&self.into, &self.out].into_iter().chain(inner)
     }
 
@@ -153,11 +151,10 @@ impl Backbone {
     ) {
         let (w, n) = (self.width, x.len() / self.inputs());
         let h = &mut scratch.h[..n * w];
-        let pair = &mut scratch.pair[..2 * n * w];
         match &self.layers {
             Layers::Tcn(layers) => {
                 exec.linear(&self.into, x, n, h, Epilogue::Store);
-                let inner = &mut scratch.inner[..n * w];
+                let (pair, inner) = scratch.inner[..3 * n * w].split_at_mut(2 * n * w);
                 for layer in layers {
                     let rows = pair.chunks_exact_mut(2 * w).zip(h.chunks_exact(w));
                     for ((frame, memory), (pair, h)) in members.iter_mut().filter_map(memory).zip(rows) {
@@ -173,21 +170,10 @@ impl Backbone {
             }
             Layers::Lstm(layers) => {
                 exec.linear(&self.into, x, n, h, Epilogue::Gelu);
-                let gates = &mut scratch.inner[..4 * n * w];
                 for (i, layer) in layers.iter().enumerate() {
-                    let cells = 2 * i * w..2 * (i + 1) * w;
-                    let rows = pair.chunks_exact_mut(2 * w).zip(h.chunks_exact(w));
-                    for ((_, memory), (pair, h)) in members.iter_mut().filter_map(memory).zip(rows) {
-                        pair[..w].copy_from_slice(h);
-                        pair[w..].copy_from_slice(&memory[cells.clone()][w..]);
-                    }
-                    exec.linear(layer, pair, n, gates, Epilogue::Store);
-                    let rows = gates.chunks_exact(4 * w).zip(h.chunks_exact_mut(w));
-                    for ((_, memory), (gates, h)) in members.iter_mut().filter_map(memory).zip(rows) {
-                        let (cell, hidden) = memory[cells.clone()].split_at_mut(w);
-                        exec.lstm(gates, cell, hidden);
-                        h.copy_from_slice(hidden);
-                    }
+                    layer.step(exec, &mut scratch.inner, h, members, |member| {
+                        memory(member).map(|(_, memory)| &mut memory[2 * i * w..2 * (i + 1) * w])
+                    });
                 }
             }
         }

@@ -8,6 +8,7 @@ use crate::config::{AppraisalConfig, HearingConfig};
 use crate::error::Result;
 use crate::frame::BLOCK_FRAMES;
 use crate::kernels::{Epilogue, Exec, Kernels, Matrix};
+use crate::nn::Lstm;
 
 /// What a frame has beside features: two levels and the sensitivity.
 const BESIDE: usize = 3;
@@ -16,13 +17,12 @@ const BESIDE: usize = 3;
 #[derive(Debug)]
 pub struct AppraisalWeights {
     into: Matrix,
-    cells: Matrix,
+    cells: Lstm,
     out: Matrix,
 }
 
 impl AppraisalWeights {
-    /// Reads `appraisal.into`, `appraisal.lstm` (`[4 width, 2 width]`: gates i, f, g, o on input
-    /// and hidden row) and `appraisal.out`.
+    /// Reads `appraisal.into`, `appraisal.lstm` and `appraisal.out`.
     ///
     /// # Errors
     /// As [`Tensors::linear`].
@@ -30,14 +30,14 @@ impl AppraisalWeights {
         let AppraisalConfig { width: w, reactions } = &config.appraisal;
         Ok(Self {
             into: t.linear(kernels, "appraisal.into", *w, &[config.audio.features + BESIDE])?,
-            cells: t.linear(kernels, "appraisal.lstm", 4 * w, &[2 * w])?,
+            cells: Lstm::load(t, kernels, "appraisal.lstm", *w)?,
             out: t.linear(kernels, "appraisal.out", reactions.len(), &[*w])?,
         })
     }
 
     /// Bytes of the packed matrices.
     pub fn bytes(&self) -> usize {
-        [&self.into, &self.cells, &self.out].map(Matrix::bytes).into_iter().sum()
+        [&self.into, self.cells.matrix(), &self.out].map(Matrix::bytes).into_iter().sum()
     }
 
     /// The widest row of an operation.
@@ -54,11 +54,9 @@ pub(super) struct Appraisal {
     rows: Vec<f32>,
     /// `[4, width]`.
     h: Vec<f32>,
-    /// Input and hidden row, `[2 width]`.
-    pair: Vec<f32>,
-    gates: Vec<f32>,
-    cell: Vec<f32>,
-    hidden: Vec<f32>,
+    scratch: Vec<f32>,
+    /// The cells', `[2 width]`.
+    memory: Vec<f32>,
     /// `[4, reactions]`.
     shares: Vec<f32>,
     /// Which of the reactions is none.
@@ -74,10 +72,8 @@ impl Appraisal {
         Self {
             rows: zeros(BLOCK_FRAMES * inputs),
             h: zeros(BLOCK_FRAMES * width),
-            pair: zeros(2 * width),
-            gates: zeros(4 * width),
-            cell: zeros(width),
-            hidden: zeros(width),
+            scratch: zeros(Lstm::SCRATCH * width),
+            memory: zeros(2 * width),
             shares: zeros(BLOCK_FRAMES * reactions),
             none: config.appraisal.reactions.iter().position(|name| name == AppraisalConfig::NONE),
         }
@@ -85,8 +81,7 @@ impl Appraisal {
 
     /// Forgets what was heard.
     pub(super) fn forget(&mut self) {
-        self.cell.fill(0.0);
-        self.hidden.fill(0.0);
+        self.memory.fill(0.0);
     }
 
     /// Appraises a block: features `[4, features]`, levels `[4, 2]`, sensitivity.
@@ -98,8 +93,8 @@ impl Appraisal {
         levels: &[f32],
         sensitivity: f32,
     ) {
-        let Self { rows, h, pair, gates, cell, hidden, shares, .. } = self;
-        let (inputs, width) = (rows.len() / BLOCK_FRAMES, cell.len());
+        let Self { rows, h, scratch, memory, shares, .. } = self;
+        let (inputs, width) = (rows.len() / BLOCK_FRAMES, h.len() / BLOCK_FRAMES);
         let frames = features.chunks_exact(inputs - BESIDE).zip(levels.chunks_exact(2));
         for (row, (features, levels)) in rows.chunks_exact_mut(inputs).zip(frames) {
             let (first, rest) = row.split_at_mut(features.len());
@@ -109,11 +104,7 @@ impl Appraisal {
         }
         exec.linear(&weights.into, rows, BLOCK_FRAMES, h, Epilogue::Gelu);
         for h in h.chunks_exact_mut(width) {
-            pair[..width].copy_from_slice(h);
-            pair[width..].copy_from_slice(hidden);
-            exec.linear(&weights.cells, pair, 1, gates, Epilogue::Store);
-            exec.lstm(gates, cell, hidden);
-            h.copy_from_slice(hidden);
+            weights.cells.step(exec, scratch, h, &mut [&mut memory[..]], |memory| Some(memory));
         }
         exec.linear(&weights.out, h, BLOCK_FRAMES, shares, Epilogue::Store);
         let reactions = shares.len() / BLOCK_FRAMES;

@@ -6,10 +6,11 @@ use super::head::{Head, level};
 use super::input::SoundInput;
 use super::sources::Sources;
 use crate::audio::{AudioEncoder, AudioWeights};
+use crate::bundle::{AudioSource, Tensors};
 use crate::config::HearingConfig;
 use crate::error::Result;
 use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES, FRAME_SAMPLES, Root, Transform};
-use crate::kernels::Exec;
+use crate::kernels::{Exec, Kernels};
 use glam::Vec3;
 
 /// Level at an ear that is 0 to the network, and dB that are 1.
@@ -20,16 +21,34 @@ const WARM_BLOCKS: usize = 4;
 /// Where the encoder's input bends, pascals.
 const SQUASH: f32 = 0.2;
 
-/// Weights of what hears the room.
+/// Weights of what hears the room, which all sessions share.
 #[derive(Debug)]
 pub struct HearingWeights {
     /// Encoder of what both ears hear.
     pub audio: AudioWeights,
     /// What is made of it.
     pub appraisal: AppraisalWeights,
+    /// What the encoder remembers of silence, which every session begins with.
+    quiet: Vec<f32>,
 }
 
 impl HearingWeights {
+    /// Reads `hearing.*` and `appraisal.*`. The encoder hears silence on `exec`, whose width is at
+    /// least its own.
+    ///
+    /// # Errors
+    /// As [`AudioSource::load`] and [`Tensors::linear`].
+    pub fn load(t: &Tensors<'_>, kernels: Kernels, exec: &mut Exec, config: &HearingConfig) -> Result<Self> {
+        let audio = AudioSource::load(t, &config.audio, "hearing")?.pack(kernels, &config.audio)?;
+        let appraisal = AppraisalWeights::load(t, kernels, config)?;
+        let mut encoder = AudioEncoder::new(&config.audio)?;
+        let (silence, mut features) = ([0.0; BLOCK_SAMPLES], vec![0.0; BLOCK_FRAMES * config.audio.features]);
+        exec.begin();
+        (0..WARM_BLOCKS).for_each(|_| encoder.encode(exec, &audio, &silence, &mut features));
+        exec.end();
+        Ok(Self { audio, appraisal, quiet: encoder.context() })
+    }
+
     /// Bytes of all packed weights.
     pub fn bytes(&self) -> usize {
         self.audio.bytes() + self.appraisal.bytes()
@@ -40,8 +59,6 @@ impl HearingWeights {
 pub struct Hearing {
     sources: Sources,
     encoder: AudioEncoder,
-    /// What the encoder remembers of silence, which it begins with.
-    quiet: Vec<f32>,
     height: f64,
     ears: Box<[[f32; BLOCK_SAMPLES]; 2]>,
     /// What the encoder hears.
@@ -61,25 +78,18 @@ pub struct Hearing {
 
 impl Hearing {
     /// Takes all memory: 32 streams of ten seconds. The head's centre is `height` metres over the
-    /// head joint, along the head. The encoder hears silence on `exec`, whose width is at least its
-    /// own.
+    /// head joint, along the head.
     ///
     /// # Errors
     /// As [`AudioEncoder::new`].
-    pub fn new(exec: &mut Exec, config: &HearingConfig, weights: &HearingWeights, height: f32) -> Result<Self> {
-        let mut encoder = AudioEncoder::new(&config.audio)?;
-        let (silence, mut features) = ([0.0; BLOCK_SAMPLES], vec![0.0; BLOCK_FRAMES * config.audio.features]);
-        exec.begin();
-        (0..WARM_BLOCKS).for_each(|_| encoder.encode(exec, &weights.audio, &silence, &mut features));
-        exec.end();
+    pub fn new(config: &HearingConfig, height: f32) -> Result<Self> {
         Ok(Self {
             sources: Sources::new(),
-            quiet: encoder.context(),
-            encoder,
+            encoder: AudioEncoder::new(&config.audio)?,
             height: f64::from(height),
             ears: Box::new([[0.0; BLOCK_SAMPLES]; 2]),
             mixed: Box::new([0.0; BLOCK_SAMPLES]),
-            features,
+            features: vec![0.0; BLOCK_FRAMES * config.audio.features],
             appraisal: Appraisal::new(config),
             told: BLOCK_FRAMES * config.told(),
             vector: vec![0.0; config.width()],
@@ -112,14 +122,13 @@ impl Hearing {
         heads: &[Transform; BLOCK_FRAMES],
         sensitivity: f32,
     ) {
-        let Self { sources, encoder, quiet, height, ears, mixed, features, appraisal, told, vector, open, heard } =
-            self;
+        let Self { sources, encoder, height, ears, mixed, features, appraisal, told, vector, open, heard } = self;
         *heard = sources.have_begun(block);
         if !*heard {
             return;
         }
         if !std::mem::replace(open, true) {
-            encoder.set_context(quiet);
+            encoder.set_context(&weights.quiet);
             appraisal.forget();
         }
         ears.as_flattened_mut().fill(0.0);

@@ -39,7 +39,7 @@ pub use calibration::Calibration;
 pub use keep::Keep;
 pub use layers::{Layer, default_scheme, layers};
 pub use round::{round, sqnr_db};
-pub use scene::Scene;
+pub use scene::{Scene, Sound};
 pub use teacher::{Forced, FrameError, Teacher};
 
 use crate::bundle::{BundleFile, StoredWeights, Tensors};

@@ -15,6 +15,20 @@ pub struct Scene {
     heads: Vec<(f64, Vec3)>,
     blocks: usize,
     gaze: Option<f32>,
+    sounds: Vec<Sound>,
+}
+
+/// A sound in the room.
+#[derive(Debug, Clone)]
+pub struct Sound {
+    /// Number of its source.
+    pub id: u32,
+    /// Where it is, world metres.
+    pub place: Vec3,
+    /// The block that it begins with.
+    pub block: usize,
+    /// 24 kHz, pascals as they are 1 m from it.
+    pub samples: Vec<f32>,
 }
 
 impl Scene {
@@ -35,7 +49,13 @@ impl Scene {
             return Err(argument("the conversation is shorter than a block of four frames".to_owned()));
         }
         let voice = |voice: &[f32]| voice[..voice.len().min(blocks * BLOCK_SAMPLES)].to_vec();
-        Ok(Self { agent: agent.map(voice), user: user.map(voice), heads, blocks, gaze })
+        Ok(Self { agent: agent.map(voice), user: user.map(voice), heads, blocks, gaze, sounds: Vec::new() })
+    }
+
+    /// The same with sounds in the room, which are for bundles with hearing; others get none.
+    #[must_use]
+    pub fn with_sounds(self, sounds: Vec<Sound>) -> Self {
+        Self { sounds, ..self }
     }
 
     /// The same user and length with the two voices exchanged: a conversation that nothing was
@@ -62,6 +82,7 @@ impl Scene {
     /// Those of pushing and polling, and of `made`.
     pub fn play(&self, session: &mut Session, mut made: impl FnMut(&mut Session, usize) -> Result<()>) -> Result<()> {
         let mut heads = self.heads.iter().peekable();
+        let sounds = if session.engine().has_hearing() { &self.sounds[..] } else { &[] };
         let chunk = |voice: &Option<Vec<f32>>, block: usize| -> Option<Vec<f32>> {
             Some(voice.as_ref()?.chunks(BLOCK_SAMPLES).nth(block)?.to_vec())
         };
@@ -75,6 +96,12 @@ impl Scene {
             }
             while let Some((time, position)) = heads.next_if(|(time, _)| *time <= now) {
                 session.push_user_head(*position, *time)?;
+            }
+            for Sound { id, place, block: first, samples } in sounds {
+                let piece = block.checked_sub(*first).and_then(|i| samples.chunks(BLOCK_SAMPLES).nth(i));
+                if let Some(samples) = piece {
+                    session.push_sound(*id, samples, SAMPLE_RATE, *place)?;
+                }
             }
             session.poll(now)?;
             made(session, block)?;

@@ -6,7 +6,8 @@
 //! every block from the reference's past: the same latents behind it (through its own weights), or
 //! of the kind `dram` the same memory, the same root and posture, the same noise, the same user. So
 //! the difference is that of one block, and does not grow. Its voices go through its own audio
-//! encoder. Neither re-anchors.
+//! encoder, and, where the bundles hear, the scene's sounds through all that hears. Neither
+//! re-anchors.
 
 use super::argument;
 use super::scene::Scene;

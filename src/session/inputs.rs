@@ -218,9 +218,9 @@ pub(super) fn listen(exec: &mut Exec, engine: &Engine, inputs: &mut [Listening<'
 }
 
 impl Inputs {
-    pub(super) fn new(exec: &mut Exec, engine: &Engine, options: &SessionOptions) -> Result<Self> {
-        let hearing = engine.config.hearing.as_ref().zip(engine.hearing.as_ref());
-        let hearing = hearing.map(|(config, weights)| Hearing::new(exec, config, weights, engine.config.rig.eyes[1]));
+    pub(super) fn new(engine: &Engine, options: &SessionOptions) -> Result<Self> {
+        let hearing = engine.config.hearing.as_ref();
+        let hearing = hearing.map(|config| Hearing::new(config, engine.config.rig.eyes[1]));
         Ok(Self {
             agent: EncodedVoice::new(engine, options, engine.config.agent_delay_blocks)?,
             user: EncodedVoice::new(engine, options, engine.config.user_delay_blocks)?,

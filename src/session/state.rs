@@ -44,7 +44,7 @@ impl BlockState {
         let dyadic = if engine.config.dram.is_some() { rig.joints.len() } else { 0 };
         let frame = || Frame { dyadic: vec![0.0; dyadic], ..Frame::empty(rig.joints.len()) };
         Ok(Self {
-            inputs: Inputs::new(exec, engine, options)?,
+            inputs: Inputs::new(engine, options)?,
             maker,
             fallback: None,
             motion,

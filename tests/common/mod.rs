@@ -30,7 +30,7 @@ pub fn dram(backbone: &str) -> Arc<Engine> {
 
 /// The same with all matrices at `scheme` that can be.
 pub fn dram_in(backbone: &str, scheme: Scheme) -> Arc<Engine> {
-    let file = widened(&golden_path(&format!("dram-{backbone}.safetensors")));
+    let file = widened(&read(&format!("dram-{backbone}.safetensors")));
     let options = Options { scheme, smallest: 0, keep: &[], calibration: None, budget: None };
     let quantised = quantise(&file, &options).expect("it can be quantised");
     Engine::from_bytes(quantised.bytes, "tiny").expect("the result loads")
@@ -38,14 +38,17 @@ pub fn dram_in(backbone: &str, scheme: Scheme) -> Arc<Engine> {
 
 /// The tiny bundle in f32, with weights that f16 does not hold.
 pub fn tiny_f32() -> BundleFile<'static> {
-    widened(&golden_path("tiny.safetensors"))
+    widened(&read("tiny.safetensors"))
+}
+
+fn read(name: &str) -> Vec<u8> {
+    std::fs::read(golden_path(name)).expect("the bundle is there")
 }
 
 /// A bundle of half floats in f32, with weights that f16 does not hold.
-fn widened(path: &Path) -> BundleFile<'static> {
-    let bytes = std::fs::read(path).expect("the tiny bundle is there");
-    let (_, header) = SafeTensors::read_metadata(&bytes).expect("a header");
-    let file = SafeTensors::deserialize(&bytes).expect("a sound container");
+fn widened(bytes: &[u8]) -> BundleFile<'static> {
+    let (_, header) = SafeTensors::read_metadata(bytes).expect("a header");
+    let file = SafeTensors::deserialize(bytes).expect("a sound container");
     let widen = |view: &TensorView<'_>| -> Vec<u8> {
         if view.dtype() == Dtype::F32 {
             return view.data().to_vec();
@@ -197,7 +200,7 @@ pub fn hearing_bytes() -> Vec<u8> {
 
 /// The same, with guidance that goes `guidance` times as far while it reacts.
 pub fn guided_hearing_bytes(guidance: f32) -> Vec<u8> {
-    with_hearing(&std::fs::read(golden_path("tiny.safetensors")).expect("the tiny bundle is there"), guidance)
+    with_hearing(&read("tiny.safetensors"), guidance)
 }
 
 /// An engine of [`hearing_bytes`].
@@ -205,16 +208,15 @@ pub fn hearing() -> Arc<Engine> {
     Engine::from_bytes(hearing_bytes(), "tiny with hearing").expect("it loads")
 }
 
-/// The same in f32, then with all matrices at `scheme` that can be.
+/// The same in f32.
+pub fn hearing_f32() -> BundleFile<'static> {
+    widened(&hearing_bytes())
+}
+
+/// That with all matrices at `scheme` that can be.
 pub fn hearing_in(scheme: Scheme) -> Arc<Engine> {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("hearing-{scheme}-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder");
-    let path = folder.join("tiny.safetensors");
-    std::fs::write(&path, hearing_bytes()).expect("a file");
-    let file = widened(&path);
     let options = Options { scheme, smallest: 0, keep: &[], calibration: None, budget: None };
-    let quantised = quantise(&file, &options).expect("it can be quantised");
-    std::fs::remove_dir_all(&folder).expect("it is ours");
+    let quantised = quantise(&hearing_f32(), &options).expect("it can be quantised");
     Engine::from_bytes(quantised.bytes, "tiny with hearing").expect("the result loads")
 }
 

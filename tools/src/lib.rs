@@ -13,7 +13,7 @@
 //! | [`soak`] | one session driven for hours |
 //! | [`mod@bench`] | block times, stages, memory |
 //! | [`react`] | a whole clip of sounds to motion |
-//! | [`room`] | what interrupts the demo's conversation |
+//! | [`room`] | sounds in the room of the sample conversation |
 //! | [`serve`] | the live page's folder by the paths of requests |
 //! | [`trace`] | every stage of a session on disk |
 //!

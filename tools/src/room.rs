@@ -1,4 +1,5 @@
-//! Sounds of the demo, made by rule: a dog, a crash, music.
+//! Sounds of the demo, and of the scene that bundles are quantised for and judged by, made by rule: a
+//! dog, a crash, a telephone, music.
 //!
 //! They go through a session, so sines and powers are those of `libm`: the same on every machine.
 
@@ -9,13 +10,6 @@ use std::f64::consts::TAU;
 const RATE: f64 = 24_000.0;
 /// What interrupts the sample conversation: where, and when, in its world.
 pub fn interruptions() -> Vec<Sound> {
-    let sound = |name: &str, samples: Vec<f32>, place: [f64; 3], start: f64| Sound {
-        name: name.to_owned(),
-        samples,
-        place: DVec3::from_array(place),
-        start,
-        id: None,
-    };
     vec![
         sound("dog", dog(), [2.4, 0.4, 1.2], 3.2),
         // The user is in front of the agent then, which faces +Z.
@@ -23,6 +17,23 @@ pub fn interruptions() -> Vec<Sound> {
         // The user has walked to its right, where it looks.
         sound("music", music(), [0.9, 0.9, 1.9], 20.3),
     ]
+}
+
+/// What sounds around the agent while the sample conversation goes on, each from elsewhere, with
+/// pauses. The first two are within the three seconds that sensitivity is measured on.
+pub fn around() -> Vec<Sound> {
+    vec![
+        sound("crash", crash(), [-1.2, 0.3, -2.2], 0.4),
+        sound("telephone", telephone(), [2.1, 0.8, 0.4], 2.5),
+        sound("dog", dog(), [-2.4, 0.4, 1.2], 7.1),
+        sound("music", music(), [0.9, 0.9, 2.6], 12.0),
+        sound("telephone", telephone(), [-2.0, 0.8, -0.5], 21.3),
+        sound("crash", crash(), [1.6, 0.3, -1.5], 26.0),
+    ]
+}
+
+fn sound(name: &str, samples: Vec<f32>, place: [f64; 3], start: f64) -> Sound {
+    Sound { name: name.to_owned(), samples, place: DVec3::from_array(place), start, id: None }
 }
 
 /// Barks: a throat that opens and closes, its pitch rising and falling. 85 dB SPL.
@@ -74,6 +85,22 @@ fn crash() -> Vec<f32> {
                 + decay(since, 0.012) * hiss * 0.8
         });
         thud + landed.sum::<f64>()
+    })
+}
+
+/// Two rings of a bell that a clapper strikes 22 times a second. 80 dB SPL.
+fn telephone() -> Vec<f32> {
+    const PARTIALS: [(f64, f64); 4] = [(1040.0, 1.0), (1385.0, 0.8), (2710.0, 0.4), (4330.0, 0.2)];
+    const STRIKES: f64 = 22.0;
+    const RINGS: [f64; 2] = [0.0, 1.3];
+    const LONG: f64 = 0.8;
+    made(2.6, 0.2, |t| {
+        let since = RINGS.iter().rev().map(|start| t - start).find(|s| *s >= 0.0).unwrap_or(LONG);
+        // The last strike of a ring dies away.
+        let strike = since.min(LONG - 1.0 / STRIKES);
+        let after = since - (strike * STRIKES).floor() / STRIKES;
+        let bell = PARTIALS.iter().map(|(pitch, loud)| loud * wave(pitch * since));
+        (since * 400.0).min(1.0) * decay(after, 0.06) * bell.sum::<f64>()
     })
 }
 
@@ -135,8 +162,14 @@ mod tests {
 
     #[test]
     fn sounds_are_finite_loud_as_said_and_end_in_silence() {
-        let sounds = interruptions();
-        for (sound, level) in sounds.iter().zip([0.36_f32, 1.8, 0.11]) {
+        let level = |name: &str| match name {
+            "dog" => 0.36_f32,
+            "crash" => 1.8,
+            "telephone" => 0.2,
+            _ => 0.11,
+        };
+        for sound in interruptions().iter().chain(&around()) {
+            let level = level(&sound.name);
             let rms = |part: &[f32]| (part.iter().map(|x| x * x).sum::<f32>() / part.len() as f32).sqrt();
             let loudest = sound.samples.chunks(1200).map(rms).fold(0.0, f32::max);
             assert!((loudest / level - 1.0).abs() < 1e-3, "{}: {loudest}", sound.name);
@@ -146,6 +179,19 @@ mod tests {
             );
             assert!(end < 0.05 * level && most < 20.0, "{}: {end} at its end, {most} at most", sound.name);
         }
-        assert!(sounds.windows(2).all(|w| w[0].start + w[0].samples.len() as f64 / RATE < w[1].start));
+        for sounds in [interruptions(), around()] {
+            assert!(sounds.windows(2).all(|w| w[0].end() < w[1].start));
+        }
+    }
+
+    /// Wherever the agent looks, something sounds to its left, to its right and behind it.
+    #[test]
+    fn what_is_around_comes_from_all_sides() {
+        let mut bearings: Vec<_> = around().iter().map(|s| s.place.x.atan2(s.place.z)).collect();
+        bearings.sort_by(f64::total_cmp);
+        let last = bearings[bearings.len() - 1] - TAU;
+        let gaps = std::iter::once(last).chain(bearings.iter().copied()).zip(&bearings).map(|(a, b)| b - a);
+        assert!(gaps.fold(0.0, f64::max) < TAU / 4.0, "{bearings:?}");
+        assert!(around().iter().all(|s| (1.5..3.0).contains(&s.place.x.hypot(s.place.z))));
     }
 }

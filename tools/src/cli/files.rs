@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use visavis::{Engine, Error, ErrorKind, Result};
 use visavis_tools::offline::{Conversation, Sound};
+use visavis_tools::room;
 
 /// The shipped bundles; the first that is there is the default.
 const MODELS: [&str; 2] = ["models/visavis-base-i8.safetensors", "models/visavis-base.safetensors"];
@@ -59,6 +60,12 @@ fn sample(name: &str) -> Result<PathBuf> {
 /// The sample conversation.
 pub fn conversation() -> Result<Conversation> {
     interrupted(Vec::new())
+}
+
+/// The sample conversation as bundles are quantised for and judged by: those that hear sounds in the
+/// room hear some.
+pub fn judged() -> Result<Conversation> {
+    interrupted(room::around())
 }
 
 /// The sample conversation with sounds in the room.

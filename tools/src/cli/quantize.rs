@@ -56,14 +56,14 @@ pub fn run(args: &QuantizeArgs) -> Result<()> {
     };
     let budget = match args.auto {
         None => None,
-        Some(mm) => Some(Budget { mm, scene: files::conversation()?.scene(BLOCKS, None)?, progress: &progress }),
+        Some(mm) => Some(Budget { mm, scene: files::judged()?.scene(BLOCKS, None)?, progress: &progress }),
     };
     // Rounding to f16 has nothing to choose.
     // Statistics are taken of the flow model alone.
     let flow = file.parse()?.0.kind == Kind::Sarah;
     let calibrated = args.scheme != Scheme::F16 && !args.plain && flow;
     let calibration = match calibrated {
-        true => Some(files::conversation()?.scene(usize::MAX, None)?),
+        true => Some(files::judged()?.scene(usize::MAX, None)?),
         false => None,
     };
     let options = Options {

@@ -60,7 +60,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
     let options = Options {
         reference: args.reference.clone(),
         candidates: args.candidate.clone(),
-        talk: &files::conversation()?,
+        talk: &files::judged()?,
         blocks: args.blocks.unwrap_or(if args.quick { 12 } else { 240 }) as usize,
         minutes: if args.quick { 0.2 } else { args.minutes },
         timed: if args.quick { 10 } else { 200 },

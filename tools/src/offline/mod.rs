@@ -42,7 +42,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::time::{Duration, Instant};
 use visavis::internals::frame::{BLOCK_SAMPLES, FRAME_SAMPLES};
-use visavis::internals::quant::Scene;
+use visavis::internals::quant::{self, Scene};
 use visavis::internals::session::Probe;
 use visavis::stats::SessionStats;
 use visavis::{BLOCK_FRAMES, Error, ErrorKind, FPS, Result, SAMPLE_RATE, Session};
@@ -170,13 +170,19 @@ impl Conversation {
     }
 
     /// The first `blocks` blocks (all of them when there are fewer) as the quantiser takes them,
-    /// with a gaze target or none.
+    /// sounds included, with a gaze target or none.
     ///
     /// # Errors
     /// [`ErrorKind::Argument`] when there is not a whole block.
     pub fn scene(&self, blocks: usize, gaze: Option<f32>) -> Result<Scene> {
         let heads = self.path.as_ref().map(for_session).unwrap_or_default();
-        Scene::new(self.agent(), self.user(), heads, blocks.min(self.frames() / BLOCK_FRAMES), gaze)
+        let sounds = self.sounds.iter().map(|(id, sound)| {
+            let first = first_sample(sound);
+            let samples = [&vec![0.0; first % BLOCK_SAMPLES][..], &sound.samples].concat();
+            quant::Sound { id: *id, place: sound.place.as_vec3(), block: first / BLOCK_SAMPLES, samples }
+        });
+        let scene = Scene::new(self.agent(), self.user(), heads, blocks.min(self.frames() / BLOCK_FRAMES), gaze)?;
+        Ok(scene.with_sounds(sounds.collect()))
     }
 
     /// Sounds in the room, each with the number of its source.
@@ -394,7 +400,11 @@ pub fn run(session: &mut Session, talk: &Conversation, progress: &mut dyn FnMut(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::room;
+    use visavis::internals::quant::Teacher;
+    use visavis::internals::session::Anchoring;
     use visavis::internals::user::HeadTrack;
+    use visavis::{Engine, Sampler, SessionOptions};
 
     fn path(text: &str) -> Option<UserPath> {
         Some(UserPath::parse(text).unwrap())
@@ -435,6 +445,21 @@ mod tests {
         path.points().iter().for_each(|&(time, position)| track.push(position, time));
         let stats = track.stats();
         assert_eq!((stats.accepted, stats.teleports, stats.overwritten), (path.points().len() as u64, 0, 0));
+    }
+
+    /// The sessions of the quantiser and of the report hear what any session hears.
+    #[test]
+    fn a_scene_sounds_as_its_conversation_does() {
+        let golden = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/goldens/hearing.safetensors");
+        let engine = Engine::load(golden).unwrap();
+        let sounds = room::around().into_iter().take(2).collect();
+        let talk = Conversation::read_with(None, None, None, sounds, None).unwrap();
+        let sampler = Sampler::Midpoint2;
+        let teacher = Teacher::new(&engine, talk.scene(20, None).unwrap(), sampler, 3, &mut None).unwrap();
+        let options = SessionOptions { seed: 3, sampler, diagnostics: Anchoring::Never.into(), ..Default::default() };
+        let outcome = run(&mut engine.session(options).unwrap(), &talk, &mut |_| {}).unwrap();
+        assert_eq!(outcome.stats.inputs.sounds.started, 2);
+        assert!(teacher.frames().eq(&outcome.recording.frames[..80]));
     }
 
     #[test]
