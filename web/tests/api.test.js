@@ -330,26 +330,28 @@ test("what is wrong is refused with its kind, what is only odd is counted", asyn
   await assert.rejects(engine.session().ready, kind("closed"));
 });
 
-test("any values at all: an error of ours or none, and the session goes on", async () => {
-  const engine = await load();
-  const session = engine.session({ clock: "manual", sampler: "single" });
-  session.onError = (error) => assert.ok(error instanceof VisavisError && error.kind !== "fault", `${error}`);
-  const odd = [NaN, Infinity, -Infinity, 0, -0, 1e308, -1e308, 5e-324, 1.5, 2 ** 53, -1, null, undefined, "", "agent", {}, [], true, 10n, new Float32Array(3), () => 0];
-  let state = 7;
-  const pick = () => odd[(state = (Math.imul(state, 1664525) + 1013904223) >>> 0) % odd.length];
-  const calls = ["pushUserHead", "pushUserVoice", "pushAgentVoice", "finishVoice", "clearVoice", "setVoicePresent", "setGaze", "setSampler", "setBudget", "setFallback", "reportBlockTime", "pushSound", "endSound", "pushEars", "endEars", "heardPlace", "setSensitivity"];
-  for (let i = 0; i < 3000; i++) {
-    try {
-      await session[calls[i % calls.length]](pick(), pick(), pick(), pick());
-    } catch (error) {
-      assert.ok(error instanceof VisavisError && error.kind !== "fault", `${calls[i % calls.length]}: ${error.stack}`);
+for (const bundle of ["tiny", "hearing"]) {
+  test(`any values at all, ${bundle}: an error of ours or none, and the session goes on`, async () => {
+    const engine = await load({ bundle: `tests/goldens/${bundle}.safetensors` });
+    const session = engine.session({ clock: "manual", sampler: "single" });
+    session.onError = (error) => assert.ok(error instanceof VisavisError && error.kind !== "fault", `${error}`);
+    const odd = [NaN, Infinity, -Infinity, 0, -0, 1e308, -1e308, 5e-324, 1.5, 2 ** 53, -1, null, undefined, "", "agent", {}, [], true, 10n, new Float32Array(3), () => 0];
+    let state = 7;
+    const pick = () => odd[(state = (Math.imul(state, 1664525) + 1013904223) >>> 0) % odd.length];
+    const calls = ["pushUserHead", "pushUserVoice", "pushAgentVoice", "finishVoice", "clearVoice", "setVoicePresent", "setGaze", "setSampler", "setBudget", "setFallback", "reportBlockTime", "pushSound", "endSound", "pushEars", "endEars", "heardPlace", "setSensitivity"];
+    for (let i = 0; i < 3000; i++) {
+      try {
+        await session[calls[i % calls.length]](pick(), pick(), pick(), pick());
+      } catch (error) {
+        assert.ok(error instanceof VisavisError && error.kind !== "fault", `${calls[i % calls.length]}: ${error.stack}`);
+      }
     }
-  }
-  const before = (await session.stats()).blocks;
-  await session.advance(1);
-  assert.ok((await session.stats()).blocks > before);
-  engine.close();
-});
+    const before = (await session.stats()).blocks;
+    await session.advance(1);
+    assert.ok((await session.stats()).blocks > before);
+    engine.close();
+  });
+}
 
 test("memory is flat over an hour of motion", async () => {
   const engine = await load();
