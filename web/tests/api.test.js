@@ -2,7 +2,8 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import test from "node:test";
-import { Visavis, VisavisError, load, root } from "./load.js";
+import { load } from "./closing.js";
+import { Visavis, VisavisError, root } from "./load.js";
 import { fill } from "./scene.js";
 
 const kind = (wanted, part) => (error) => {

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import test from "node:test";
 import { cases, motion } from "./scene.js";
-import { load } from "./load.js";
+import { load } from "./closing.js";
 
 const modules = [{ module: "simd128" }, { module: "relaxed" }];
 if (process.env.VISAVIS_SCALAR) modules.push({ module: "simd128", wasm: { simd128: readFileSync(process.env.VISAVIS_SCALAR) }, name: "scalar" });
