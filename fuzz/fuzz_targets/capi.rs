@@ -41,6 +41,17 @@ enum Call {
     Path([u8; 12]),
     Descriptor(u64, u64),
     Abi(u32),
+    /// A sound in the room: source, length, rate, value, place, pointers.
+    Source(u8, u16, u32, f32, [f32; 3], u8),
+    /// The same at a rate that is allowed, within some metres.
+    GoodSource { id: u8, len: u16, place: [i8; 3] },
+    EndSource(u8),
+    /// What a host's ears hear: length, rate, values, pointers.
+    Ears(u16, u32, [f32; 2], u8),
+    GoodEars { len: u16, ahead: u8 },
+    EndEars,
+    Sensitivity(f32),
+    HeardPlace { pointers: u8 },
 }
 
 /// What no function may touch.
@@ -271,6 +282,55 @@ impl Caller {
                     visavis_engine_from_fd(-1, offset, length, &mut engine)
                 }
                 Call::Abi(version) => visavis_check_abi(version),
+                Call::Source(id, len, rate, value, [x, y, z], pointers) => {
+                    sound.fill(value);
+                    let data = pointer(sound.as_mut_ptr(), pointers, 0);
+                    let count = if pointers & 3 < 2 { usize::from(len) % sound.len() } else { usize::from(len) << 48 };
+                    visavis_session_push_sound(pointer(session, pointers, 1), u32::from(id), data, count, rate, x, y, z)
+                }
+                Call::GoodSource { id, len, place } => {
+                    sound.iter_mut().enumerate().for_each(|(i, s)| *s = 60.0 * (i as f32 * 0.1).sin());
+                    let ([x, y, z], count) = (place.map(|v| f32::from(v) / 20.0), usize::from(len) % sound.len());
+                    let status =
+                        visavis_session_push_sound(session, u32::from(id), sound.as_ptr(), count, 24_000, x, y, z);
+                    assert_eq!(status, VisavisStatus::Ok);
+                    status
+                }
+                Call::EndSource(id) => visavis_session_end_sound(session, u32::from(id)),
+                Call::Ears(len, rate, values, pointers) => {
+                    let (left, right) = sound.split_at_mut(2048);
+                    left.fill(values[0]);
+                    right.fill(values[1]);
+                    let told = pointers & 3 < 2 && pointers >> 2 & 3 < 2;
+                    let count = if told { usize::from(len) % left.len() } else { usize::from(len) << 48 };
+                    let (left, right) =
+                        (pointer(left.as_mut_ptr(), pointers, 0), pointer(right.as_mut_ptr(), pointers, 1));
+                    visavis_session_push_ears(pointer(session, pointers, 2), left, right, count, rate)
+                }
+                Call::GoodEars { len, ahead } => {
+                    sound.iter_mut().enumerate().for_each(|(i, s)| *s = 60.0 * (i as f32 * 0.1).sin());
+                    let count = usize::from(len) % 2048;
+                    let right = sound[usize::from(ahead)..].as_ptr();
+                    let status = visavis_session_push_ears(session, sound.as_ptr(), right, count, 24_000);
+                    assert_eq!(status, VisavisStatus::Ok);
+                    status
+                }
+                Call::EndEars => visavis_session_end_ears(session),
+                Call::Sensitivity(sensitivity) => visavis_session_set_sensitivity(session, sensitivity),
+                Call::HeardPlace { pointers } => {
+                    let (mut place, mut known) = ([f32::NAN; 4], -1);
+                    let to = pointer(place.as_mut_ptr(), pointers, 0);
+                    let status = visavis_session_heard_place(
+                        pointer(session, pointers, 1),
+                        to,
+                        pointer(&mut known, pointers, 2),
+                    );
+                    let told = status == VisavisStatus::Ok;
+                    assert!(if told { known == 0 || known == 1 } else { known == -1 }, "{known}");
+                    assert!(place[..3].iter().all(|v| v.is_finite() == (known == 1)), "{place:?}");
+                    assert!(place[3].is_nan(), "beyond the place");
+                    status
+                }
             }
         }
     }

@@ -264,6 +264,8 @@ fn poll(session: &mut Session, now: f64, next: &mut Option<u64>) -> u32 {
                 assert!(frame.global.iter().all(|t| t.position.is_finite() && t.rotation.is_finite()));
                 assert!(frame.local.iter().all(|q| q.is_finite()) && frame.hips.is_finite());
             }
+            let place = session.heard_place();
+            assert!(place.is_none_or(|place| place.is_finite() && session.sounds().is_heard()), "{place:?}");
             1
         }
         Err(e) => {

@@ -151,6 +151,11 @@ class SessionCore {
     this.core.do("visavis_end_ears", this.pointer);
   }
 
+  /** [x, y, z], or null. */
+  heardPlace() {
+    return this.core.withBytes(new Uint8Array(12), (at) => (this.core.call("visavis_heard_place", this.pointer, at) ? [...new Float32Array(this.core.buffer, at, 3)] : null));
+  }
+
   setSensitivity(sensitivity) {
     this.core.do("visavis_set_sensitivity", this.pointer, sensitivity);
   }

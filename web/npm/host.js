@@ -152,6 +152,10 @@ export function serve(port) {
       this.#session.endEars();
     }
 
+    heardPlace() {
+      return this.#session.heardPlace();
+    }
+
     setSensitivity(sensitivity) {
       this.#session.setSensitivity(sensitivity);
     }

@@ -114,13 +114,6 @@ export interface SessionOptions {
    * counted. A second takes 192 KB: a crowd that hears sound as it comes does with the least.
    */
   voiceAhead?: number;
-  /**
-   * A piece of what two microphones at the agent's ears hear, pascals, as many samples of each, `rate` 8000 to 192000 Hz: for pages that do not
-   * know where sounds are. The direction is estimated as the agent's head turns. Throws where the bundle has no hearing.
-   */
-  pushEars(left: Float32Array, right: Float32Array, rate: number): void;
-  /** Ends what the ears brought at once. */
-  endEars(): void;
   /** How much the agent minds sounds in the room: -1 dull, 0 (default) neutral, 1 sensitive, up to 1.5 either way. */
   sensitivity?: number;
   /** `real` (default): blocks are computed as time goes by. `manual`: by {@link Session.advance}. */
@@ -172,6 +165,19 @@ export interface Session {
   pushSound(id: number, samples: Float32Array, rate: number, position: ArrayLike<number>): void;
   /** Ends a source at once. */
   endSound(id: number): void;
+  /**
+   * A piece of what two microphones at the agent's ears hear, pascals, as many samples of each, `rate` 8000 to 192000 Hz: for pages that do not
+   * know where sounds are. The direction is estimated as the agent's head turns. Throws where the bundle has no hearing.
+   */
+  pushEars(left: Float32Array, right: Float32Array, rate: number): void;
+  /** Ends what the ears brought at once. */
+  endEars(): void;
+  /**
+   * Where the last block took what stands out among the sounds to be, x, y, z in world metres: the place of a source, or, of what
+   * {@link Session.pushEars} brought, the direction that was estimated, 2 m away and 1.5 m over the floor. Null before any sound, two seconds
+   * after it has faded, and where the bundle has no hearing.
+   */
+  heardPlace(): Promise<[number, number, number] | null>;
   /** How much the agent minds sounds in the room: -1 dull, 0 neutral, 1 sensitive, up to 1.5 either way. */
   setSensitivity(sensitivity: number): void;
   setGaze(target: number | null): void;

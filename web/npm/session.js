@@ -104,6 +104,11 @@ export class Session {
     this.#tell("endEars", []);
   }
 
+  /** Resolves to [x, y, z], or null. */
+  heardPlace() {
+    return this.#ask("heardPlace", []);
+  }
+
   setSensitivity(sensitivity) {
     if (!(Math.abs(number("sensitivity", sensitivity)) <= 1.5)) throw argument(`sensitivity ${sensitivity}: -1.5 to 1.5`);
     this.#tell("setSensitivity", [sensitivity]);

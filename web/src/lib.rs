@@ -1,4 +1,4 @@
-//! Visavis as a WebAssembly module: a plain C interface of numbers, which `npm/module.js` calls.
+//! Visavis as a WebAssembly module: a plain C interface of numbers, which `npm/core.js` calls.
 //!
 //! **Ownership.** Memory that JavaScript fills is taken by [`visavis_alloc`] and given back by
 //! [`visavis_free`]. An engine and a session live until they are freed, a session keeps its engine

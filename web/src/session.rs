@@ -181,6 +181,17 @@ pub unsafe extern "C" fn visavis_end_ears(session: *mut Conversation) -> i32 {
     unsafe { with(session, |s| s.end_ears()) }
 }
 
+/// Where the last block took what stands out among the sounds to be: 1, and x, y, z in world metres
+/// at `place`; 0, and `place` as it was, while nothing is known.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn visavis_heard_place(session: *const Conversation, place: *mut f32) -> i32 {
+    // SAFETY: the chapter on ownership.
+    let Some(heard) = unsafe { &*session }.session.heard_place() else { return 0 };
+    // SAFETY: room for three numbers, by the chapter on ownership.
+    unsafe { place.cast::<[f32; 3]>().write(heard.to_array()) };
+    1
+}
+
 /// Sets how much the agent minds sounds in the room: -1 dull, 0 neutral, 1 sensitive, up to 1.5
 /// either way.
 #[unsafe(no_mangle)]

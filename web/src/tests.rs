@@ -188,10 +188,17 @@ fn sounds_that_are_wrong_have_a_status_and_are_counted() {
         visavis_engine_facts(hearing);
         assert!(text().contains(r#""hasHearing":true"#), "{}", text());
         let push = |count, rate, x| visavis_push_sound(conversation, 1, sound.as_ptr(), count, rate, x, 1.0, 2.0);
+        let mut place = [f32::NAN; 3];
+        assert_eq!(visavis_heard_place(conversation, place.as_mut_ptr()), 0);
+        assert!(place.iter().all(|v| v.is_nan()), "{place:?}");
         assert_eq!(push(1, 24_000, f32::INFINITY), 1, "{}", text());
         assert_eq!(push(1, 0, 0.0), 6, "{}", text());
         assert_eq!(push(3, 24_000, 0.0), 6, "{}", text());
         assert_eq!(visavis_poll(conversation, 0.0), 1);
+        // A block hears what was heard before it.
+        assert_eq!(visavis_heard_place(conversation, place.as_mut_ptr()), 0);
+        assert_eq!(visavis_poll(conversation, visavis_next_due(conversation)), 1);
+        assert_eq!((visavis_heard_place(conversation, place.as_mut_ptr()), place), (1, [0.0, 1.0, 2.0]));
         assert_eq!(visavis_end_sound(conversation, 1), 0);
         assert_eq!(visavis_push_ears(conversation, [0.0_f32; 8].as_ptr(), 4, 7_999), 6, "{}", text());
         assert_eq!(visavis_push_ears(conversation, [0.0_f32; 8].as_ptr(), 4, 24_000), 0);
@@ -236,6 +243,7 @@ fn what_is_wrong_has_a_status_and_a_text() {
         assert_eq!(visavis_end_sound(conversation, 1), 1, "{}", text());
         assert_eq!(visavis_push_ears(conversation, [0.0_f32; 8].as_ptr(), 4, 24_000), 1, "{}", text());
         assert_eq!(visavis_end_ears(conversation), 1, "{}", text());
+        assert_eq!(visavis_heard_place(conversation, [0.0_f32; 3].as_mut_ptr()), 0);
         assert_eq!(visavis_set_sensitivity(conversation, f32::NAN), 1, "{}", text());
         assert_eq!(visavis_set_sensitivity(conversation, -1.0), 0);
         assert_eq!(visavis_poll(conversation, f64::NAN), -1, "{}", text());

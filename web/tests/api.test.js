@@ -2,7 +2,8 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import test from "node:test";
-import { Visavis, VisavisError, load, root } from "./load.js";
+import { load } from "./closing.js";
+import { Visavis, VisavisError, root } from "./load.js";
 import { fill } from "./scene.js";
 
 const kind = (wanted, part) => (error) => {
@@ -203,6 +204,58 @@ test("sounds in the room are heard where the bundle has hearing, at their place"
   deaf.close();
 });
 
+test("an agent tells where it takes a sound to be, until it forgets", async () => {
+  const engine = await load({ bundle: "tests/goldens/hearing.safetensors" });
+  const bang = Float32Array.from({ length: 9600 }, (_, i) => ((i * 7919) % 2000 - 1000) / 125);
+  const blocks = (session, count) => session.advance((count * 4) / 30);
+  const session = engine.session({ clock: "manual", sampler: "single" });
+  await blocks(session, 1.5);
+  assert.equal(await session.heardPlace(), null);
+  session.pushSound(5, bang, 24000, [1, 1.25, -2]);
+  assert.equal(await session.heardPlace(), null, "no block has heard it");
+  await blocks(session, 3);
+  assert.deepEqual(await session.heardPlace(), [1, 1.25, -2]);
+  // 0.4 s of some 100 dB, which fade by 45 dB a second to 35 dB; then two seconds.
+  await blocks(session, 16);
+  assert.deepEqual(await session.heardPlace(), [1, 1.25, -2]);
+  await blocks(session, 16);
+  assert.equal(await session.heardPlace(), null, "it is forgotten");
+  session.pushSound(5, bang, 24000, [-1, 1.25, -2]);
+  await blocks(session, 3);
+  assert.deepEqual(await session.heardPlace(), [-1, 1.25, -2]);
+  await session.reset();
+  assert.equal(await session.heardPlace(), null);
+
+  // Of two microphones one hears first and louder: it comes from that side of the head.
+  let state = 1;
+  const near = Float32Array.from({ length: 9600 }, () => ((state = (Math.imul(state, 1664525) + 1013904223) >>> 0) / 2 ** 32 - 0.5) * 0.6);
+  const far = near.map((_, i) => (i < 9 ? 0 : 0.7 * near[i - 9]));
+  const head = 11 * engine.facts.joints.findIndex(({ name }) => name === "head");
+  for (const side of [1, -1]) {
+    await session.reset();
+    let frames;
+    session.onFrames = (four) => (frames = four);
+    session.pushEars(...(side > 0 ? [near, far] : [far, near]), 24000);
+    await blocks(session, 0.5);
+    const [px, , pz, qx, qy, qz, qw] = frames[3].joints.subarray(head + 4, head + 11);
+    await blocks(session, 1);
+    const [x, y, z] = await session.heardPlace();
+    // The head's X axis, which points to the left, along the floor.
+    const left = ((1 - 2 * (qy * qy + qz * qz)) * (x - px) + 2 * (qx * qz - qw * qy) * (z - pz)) / Math.hypot(x - px, z - pz);
+    assert.ok(side * left > 0.3, `${left}`);
+    assert.equal(y, 1.5);
+  }
+  session.close();
+  await assert.rejects(session.heardPlace(), kind("closed"));
+  engine.close();
+
+  const deaf = await load();
+  const without = deaf.session({ clock: "manual", sampler: "single" });
+  await blocks(without, 2);
+  assert.equal(await without.heardPlace(), null);
+  deaf.close();
+});
+
 test("in real time a block comes every 133 ms, pauses stop it", async () => {
   const engine = await load();
   const session = engine.session({ sampler: "single" });
@@ -278,26 +331,28 @@ test("what is wrong is refused with its kind, what is only odd is counted", asyn
   await assert.rejects(engine.session().ready, kind("closed"));
 });
 
-test("any values at all: an error of ours or none, and the session goes on", async () => {
-  const engine = await load();
-  const session = engine.session({ clock: "manual", sampler: "single" });
-  session.onError = (error) => assert.ok(error instanceof VisavisError && error.kind !== "fault", `${error}`);
-  const odd = [NaN, Infinity, -Infinity, 0, -0, 1e308, -1e308, 5e-324, 1.5, 2 ** 53, -1, null, undefined, "", "agent", {}, [], true, 10n, new Float32Array(3), () => 0];
-  let state = 7;
-  const pick = () => odd[(state = (Math.imul(state, 1664525) + 1013904223) >>> 0) % odd.length];
-  const calls = ["pushUserHead", "pushUserVoice", "pushAgentVoice", "finishVoice", "clearVoice", "setVoicePresent", "setGaze", "setSampler", "setBudget", "setFallback", "reportBlockTime", "pushSound", "endSound", "setSensitivity"];
-  for (let i = 0; i < 3000; i++) {
-    try {
-      await session[calls[i % calls.length]](pick(), pick(), pick(), pick());
-    } catch (error) {
-      assert.ok(error instanceof VisavisError && error.kind !== "fault", `${calls[i % calls.length]}: ${error.stack}`);
+for (const bundle of ["tiny", "hearing"]) {
+  test(`any values at all, ${bundle}: an error of ours or none, and the session goes on`, async () => {
+    const engine = await load({ bundle: `tests/goldens/${bundle}.safetensors` });
+    const session = engine.session({ clock: "manual", sampler: "single" });
+    session.onError = (error) => assert.ok(error instanceof VisavisError && error.kind !== "fault", `${error}`);
+    const odd = [NaN, Infinity, -Infinity, 0, -0, 1e308, -1e308, 5e-324, 1.5, 2 ** 53, -1, null, undefined, "", "agent", {}, [], true, 10n, new Float32Array(3), () => 0];
+    let state = 7;
+    const pick = () => odd[(state = (Math.imul(state, 1664525) + 1013904223) >>> 0) % odd.length];
+    const calls = ["pushUserHead", "pushUserVoice", "pushAgentVoice", "finishVoice", "clearVoice", "setVoicePresent", "setGaze", "setSampler", "setBudget", "setFallback", "reportBlockTime", "pushSound", "endSound", "pushEars", "endEars", "heardPlace", "setSensitivity"];
+    for (let i = 0; i < 3000; i++) {
+      try {
+        await session[calls[i % calls.length]](pick(), pick(), pick(), pick());
+      } catch (error) {
+        assert.ok(error instanceof VisavisError && error.kind !== "fault", `${calls[i % calls.length]}: ${error.stack}`);
+      }
     }
-  }
-  const before = (await session.stats()).blocks;
-  await session.advance(1);
-  assert.ok((await session.stats()).blocks > before);
-  engine.close();
-});
+    const before = (await session.stats()).blocks;
+    await session.advance(1);
+    assert.ok((await session.stats()).blocks > before);
+    engine.close();
+  });
+}
 
 test("memory is flat over an hour of motion", async () => {
   const engine = await load();

@@ -42,6 +42,7 @@ native!("Java_org_visavis_Native_pushSoundArray": push_sound_array(
 native!("Java_org_visavis_Native_endSound": end_sound(session: jlong, id: jint));
 native!("Java_org_visavis_Native_pushEars": push_ears(session: jlong, left: jfloat[], right: jfloat[], offset: jint, count: jint, rate: jint));
 native!("Java_org_visavis_Native_endEars": end_ears(session: jlong));
+native!("Java_org_visavis_Native_heardPlace": heard_place(session: jlong, out: jfloat[], offset: jint) -> jboolean);
 native!("Java_org_visavis_Native_setSensitivity": set_sensitivity(session: jlong, sensitivity: jfloat));
 native!("Java_org_visavis_Native_pushHead": push_head(session: jlong, x: jfloat, y: jfloat, z: jfloat, time: jdouble));
 native!("Java_org_visavis_Native_pushPose": push_pose(
@@ -265,6 +266,24 @@ fn push_ears<'l>(
 
 fn end_ears<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong) -> Outcome {
     around(session, |shared| Ok(shared.sounds().end_ears()?))
+}
+
+/// Writes where the last block took what stands out to be; returns whether that is known, and leaves
+/// `out` as it was where it is not.
+fn heard_place<'l>(
+    env: &mut Env<'l>,
+    _: JClass<'l>,
+    session: jlong,
+    out: JFloatArray<'l>,
+    offset: jint,
+) -> Outcome<jboolean> {
+    if out.is_null() {
+        return Err(jni::errors::Error::NullPtr("out is null").into());
+    }
+    part(out.len(env)?, offset, 3)?;
+    let Some(place) = with(session, |s| Ok(s.heard_place()))? else { return Ok(false) };
+    out.set_region(env, offset, &place.to_array())?;
+    Ok(true)
 }
 
 fn finish_voice<'l>(_: &mut Env<'l>, _: JClass<'l>, session: jlong, voice: jint) -> Outcome {

@@ -98,6 +98,10 @@ final class ErrorTest {
             throwsWith(ARGUMENT, "array has 3", () -> session.pushEars(new float[9], sound, 0, 9, 24_000));
             throwsWith(NullPointerException.class, "null", () -> session.pushEars(sound, null, 0, 1, 24_000));
             session.endEars();
+            throwsWith(ARGUMENT, "array has 3", () -> session.heardPlace(new float[3], 1));
+            throwsWith(ARGUMENT, "array has 3", () -> session.heardPlace(new float[3], -1));
+            throwsWith(ARGUMENT, "array has 2", () -> deaf.heardPlace(new float[2], 0));
+            throwsWith(NullPointerException.class, "null", () -> session.heardPlace(null, 0));
             throwsWith(ARGUMENT, "metres", () -> session.pushSound(1, sound, 0, 1, 24_000, Float.NaN, 1, 2));
             throwsWith(ARGUMENT, "Hz", () -> session.pushSound(1, sound, 0, 1, 0, 0, 1, 2));
             throwsWith(ARGUMENT, "negative", () -> session.pushSound(1, sound, 0, 1, -1, 0, 1, 2));
@@ -135,6 +139,7 @@ final class ErrorTest {
         throwsWith(STATE, "session is closed", () -> session.poll(0, out, 0));
         throwsWith(STATE, "session is closed", () -> session.pushUserHead(0, 0, 0, 0));
         throwsWith(STATE, "session is closed", session::stats);
+        throwsWith(STATE, "session is closed", () -> session.heardPlace(new float[3], 0));
         throwsWith(STATE, "session is closed", session::reset);
         throwsWith(STATE, "session is closed", () -> session.pushAgentAudio(new float[1], 0, 1, 24_000));
         throwsWith(STATE, "session is closed", () -> Native.stats(-1));

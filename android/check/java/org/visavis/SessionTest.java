@@ -213,6 +213,87 @@ final class SessionTest {
         }
     }
 
+    /** What {@code heardPlace} writes behind a first float; null where nothing is known. */
+    private static float[] heardPlace(VisavisSession session) {
+        float[] out = {7, 8, 9, 10};
+        boolean known = session.heardPlace(out, 1);
+        equal(7f, out[0]);
+        isTrue(known || Arrays.equals(out, new float[] {7, 8, 9, 10}), "what is not known is not written");
+        return known ? Arrays.copyOfRange(out, 1, 4) : null;
+    }
+
+    static void testWhereTheAgentTakesASoundToBe() throws Exception {
+        try (VisavisEngine engine = Check.hearing();
+                VisavisEngine without = engine();
+                VisavisSession session = engine.newSession(new SessionOptions().sampler(Sampler.SINGLE));
+                VisavisSession deaf = without.newSession()) {
+            float[] out = new float[session.layout().blockFloats()];
+            session.poll(session.nextDueNanos(), out, 0);
+            deaf.poll(0, out, 0);
+            isTrue(heardPlace(session) == null && heardPlace(deaf) == null, "nothing is heard");
+            float[] bang = new float[9_600];
+            for (int i = 0; i < bang.length; i++) {
+                bang[i] = (float) ((i * 7919) % 2000 - 1000) / 125;
+            }
+            session.pushSound(5, bang, 0, bang.length, 24_000, 1, 1.25f, -2);
+            isTrue(heardPlace(session) == null, "no block has heard it");
+            for (int k = 0; k < 3; k++) {
+                session.poll(session.nextDueNanos(), out, 0);
+            }
+            isTrue(Arrays.equals(new float[] {1, 1.25f, -2}, heardPlace(session)), "the place of the source");
+            // 0.4 s of some 100 dB, which fade by 45 dB a second to 35 dB; then two seconds.
+            for (int k = 0; k < 16; k++) {
+                session.poll(session.nextDueNanos(), out, 0);
+            }
+            isTrue(heardPlace(session) != null, "two seconds later it is known");
+            for (int k = 0; k < 16; k++) {
+                session.poll(session.nextDueNanos(), out, 0);
+            }
+            isTrue(heardPlace(session) == null, "after four it is forgotten");
+            session.pushSound(5, bang, 0, bang.length, 24_000, 1, 1.25f, -2);
+            for (int k = 0; k < 3; k++) {
+                session.poll(session.nextDueNanos(), out, 0);
+            }
+            isTrue(heardPlace(session) != null, "heard once more");
+            session.reset();
+            isTrue(heardPlace(session) == null, "started anew");
+        }
+    }
+
+    /** Two microphones, of which one hears first and louder: it comes from that side of the head. */
+    static void testWhereEarsHearASound() throws Exception {
+        try (VisavisEngine engine = Check.hearing()) {
+            for (int nearer = 0; nearer < 2; nearer++) {
+                try (VisavisSession session = engine.newSession(new SessionOptions().sampler(Sampler.SINGLE))) {
+                    float[][] ears = new float[2][9_600];
+                    int state = 1;
+                    for (int i = 0; i < ears[0].length; i++) {
+                        state = state * 1_664_525 + 1_013_904_223;
+                        ears[nearer][i] = ((state >>> 16) / 65_536f - 0.5f) * 0.6f;
+                        ears[1 - nearer][i] = i < 9 ? 0 : 0.7f * ears[nearer][i - 9];
+                    }
+                    session.pushEars(ears[0], ears[1], 0, ears[0].length, 24_000);
+                    float[] before = new float[session.layout().blockFloats()];
+                    session.poll(0, before, 0);
+                    session.poll(session.nextDueNanos(), new float[before.length], 0);
+                    float[] place = heardPlace(session);
+                    int head = session.layout().joint(FrameLayout.FRAMES - 1, engine.skeleton().indexOf("head"));
+                    float x = place[0] - before[head + FrameLayout.POSITION];
+                    float z = place[2] - before[head + FrameLayout.POSITION + 2];
+                    int turn = head + FrameLayout.ROTATION;
+                    float qx = before[turn];
+                    float qy = before[turn + 1];
+                    float qz = before[turn + 2];
+                    float qw = before[turn + 3];
+                    // The head's X axis, which points to the left, along the floor.
+                    double left = ((1 - 2 * (qy * qy + qz * qz)) * x + 2 * (qx * qz - qw * qy) * z) / Math.hypot(x, z);
+                    isTrue(nearer == 0 ? left > 0.3 : left < -0.3, "side " + nearer + ": " + left);
+                    equal(1.5f, place[1]);
+                }
+            }
+        }
+    }
+
     static void testLittleSoundAhead() throws Exception {
         try (VisavisEngine engine = engine();
                 VisavisSession session = engine.newSession(new SessionOptions().voiceAhead(0.5))) {

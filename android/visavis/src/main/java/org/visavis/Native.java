@@ -66,6 +66,8 @@ final class Native {
 
     static native void endEars(long session);
 
+    static native boolean heardPlace(long session, float[] out, int offset);
+
     static native void setSensitivity(long session, float sensitivity);
 
     static native void pushHead(long session, float x, float y, float z, double time);

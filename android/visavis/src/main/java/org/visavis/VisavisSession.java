@@ -140,6 +140,20 @@ public final class VisavisSession implements AutoCloseable {
     }
 
     /**
+     * Writes where the last block took what stands out among the sounds to be, x, y, z in world metres: the place of a source, or, of what
+     * {@link #pushEars} brought, the direction that was estimated, 2 m away and 1.5 m over the floor. It stays known for two seconds after the sound
+     * has faded.
+     *
+     * @return whether a place is known and was written; false, and {@code out} as it was, before any sound, once it is forgotten, and where the bundle has
+     *     no hearing
+     * @throws IllegalArgumentException when there is no room for three floats from {@code offset} on
+     * @throws IllegalStateException when this session is closed
+     */
+    public boolean heardPlace(@NonNull float[] out, int offset) {
+        return Native.heardPlace(handle, out, offset);
+    }
+
+    /**
      * Sets how much the agent minds sounds in the room from the next block on: -1 dull, 0 neutral, 1 sensitive, numbers between and up to 1.5 either way.
      *
      * @throws IllegalArgumentException outside -1.5 to 1.5
