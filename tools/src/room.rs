@@ -1,5 +1,5 @@
-//! Sounds of the demo, and of the scene that bundles are quantised for and judged by, made by rule: a
-//! dog, a crash, a telephone, music.
+//! Sounds of the demo, and of the scene that bundles are quantised for and judged by, made by rule:
+//! a dog, a crash, a telephone, music.
 //!
 //! They go through a session, so sines and powers are those of `libm`: the same on every machine.
 

@@ -62,8 +62,8 @@ pub fn conversation() -> Result<Conversation> {
     interrupted(Vec::new())
 }
 
-/// The sample conversation as bundles are quantised for and judged by: those that hear sounds in the
-/// room hear some.
+/// The sample conversation, as bundles are quantised for and judged by: those that hear sounds in
+/// the room hear some.
 pub fn judged() -> Result<Conversation> {
     interrupted(room::around())
 }
