@@ -36,7 +36,8 @@ pub fn room_model(given: Option<&Path>) -> Result<PathBuf> {
 /// The bundle of the kind mospa to use: `given`, else the shipped one.
 pub fn clip_model(given: Option<&Path>) -> Result<PathBuf> {
     let found = given.map_or_else(|| shipped(CLIP_MODEL), |path| Ok(path.to_path_buf()));
-    found.map_err(|tried| missing("the model of whole clips", &tried, "; or name a bundle of the kind mospa by --model"))
+    found
+        .map_err(|tried| missing("the model of whole clips", &tried, "; or name a bundle of the kind mospa by --model"))
 }
 
 /// Makes sure that sounds would be heard with the bundle at `model`.
