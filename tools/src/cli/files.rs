@@ -29,15 +29,18 @@ pub fn model(given: Option<&Path>) -> Result<PathBuf> {
 /// The bundle with hearing to use: `given`, else the shipped one.
 pub fn room_model(given: Option<&Path>) -> Result<PathBuf> {
     let advice = "; or name a bundle with hearing by --model (`visavis inspect` tells)";
-    let found = given.map_or_else(|| shipped(ROOM_MODEL), |path| Ok(path.to_path_buf()));
-    found.map_err(|tried| missing("the model with hearing", &tried, advice))
+    given_or_shipped(given, ROOM_MODEL, "the model with hearing", advice)
 }
 
 /// The bundle of the kind mospa to use: `given`, else the shipped one.
 pub fn clip_model(given: Option<&Path>) -> Result<PathBuf> {
-    let found = given.map_or_else(|| shipped(CLIP_MODEL), |path| Ok(path.to_path_buf()));
-    found
-        .map_err(|tried| missing("the model of whole clips", &tried, "; or name a bundle of the kind mospa by --model"))
+    given_or_shipped(given, CLIP_MODEL, "the model of whole clips", "; or name a bundle of the kind mospa by --model")
+}
+
+/// `given`, else the file `relative` that comes with the program.
+fn given_or_shipped(given: Option<&Path>, relative: &str, what: &str, advice: &str) -> Result<PathBuf> {
+    let found = given.map_or_else(|| shipped(relative), |path| Ok(path.to_path_buf()));
+    found.map_err(|tried| missing(what, &tried, advice))
 }
 
 /// Makes sure that sounds would be heard with the bundle at `model`.
