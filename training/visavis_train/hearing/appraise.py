@@ -31,23 +31,33 @@ def load(path):
 
 
 class Streams:
-    """Stretches of a split's clips: input rows, reactions and how much each frame counts."""
+    """Stretches of a split's clips, or of rooms: input rows, reactions and how much each frame counts."""
 
-    def __init__(self, corpus, cache, split):
-        state = common.load(os.path.join(cache, split + ".pt"), mmap=True)
+    def __init__(self, state, events):
+        """`state`: `starts`, `sound`, `levels`, `sensitivity` of a cache or of rooms; `events`: of each clip."""
         self.starts, self.levels, self.sensitivity = state["starts"], state["levels"], state["sensitivity"]
         self.sound = state["sound"]
         self.label = torch.zeros(int(self.starts[-1]), dtype=torch.long)
         self.count = torch.ones(int(self.starts[-1]))
-        for i, name in enumerate(state["names"]):
+        for i, of_clip in enumerate(events):
             first, after = int(self.starts[i]), int(self.starts[i + 1])
-            for e in json.loads(store.load(os.path.join(corpus, split, name), False).meta["events"]):
+            for e in of_clip:
                 a, b = first + e["onset"], min(first + max(e["until"], e["onset"]), after)
                 self.label[a:b] = REACTIONS.index(e["reaction"])
                 heard = slice(a, min(max(first + e["end"], b), after))
                 self.count[heard] = 4.0                 # most frames are of a quiet room
                 self.count[a:a + LEAVE] = 0
                 self.count[b:min(b + 2 * LEAVE, after)] = 0
+
+    @classmethod
+    def of_corpus(cls, corpus, cache, split):
+        state = common.load(os.path.join(cache, split + ".pt"), mmap=True)
+        return cls(state, [json.loads(store.load(os.path.join(corpus, split, name), False).meta["events"]) for name in state["names"]])
+
+    @classmethod
+    def of_rooms(cls, path):
+        state = common.load(path)
+        return cls(state, json.loads(state["events"]))
 
     def batch(self, size, generator=None):
         rows = torch.randint(len(self.starts) - 1, (size,), generator=generator)
@@ -64,12 +74,14 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--corpus", required=True, help="folder of visavis_train.hearing.corpus")
     parser.add_argument("--cache", required=True, help="its cache, made with --hearing")
+    parser.add_argument("--rooms", help="half of each batch is of these (`hearing.rooms`)")
     parser.add_argument("--out", required=True)
     common.arguments(parser, steps=900, lr=3e-3, batch=32)
     args = parser.parse_args()
     common.start_process(args)
     team = Team(args.workers)
-    train, held = Streams(args.corpus, args.cache, "train"), Streams(args.corpus, args.cache, "val")
+    train, held = Streams.of_corpus(args.corpus, args.cache, "train"), Streams.of_corpus(args.corpus, args.cache, "val")
+    rooms = Streams.of_rooms(args.rooms) if args.rooms else None
     net = Appraisal(train.sound.shape[1], REACTIONS)
     loop = Loop(team, net, args, warmup=50, average=0.99, features=train.sound.shape[1], reactions=list(REACTIONS), width=net.width)
     check = held.batch(192, torch.Generator().manual_seed(1))
@@ -84,6 +96,9 @@ def main():
 
     for _ in loop:
         x, label, count = train.batch(args.batch)
+        if rooms:
+            half = args.batch // 2
+            x, label, count = (torch.cat([a[half:], b]) for a, b in zip((x, label, count), rooms.batch(half)))
         x = x + 0.1 * torch.randn_like(x)
         told = net.told(F.dropout(x, 0.1))
         loss = (F.cross_entropy(told.flatten(0, 1), label.flatten(), reduction="none") * count.flatten()).sum() / count.sum()

@@ -6,7 +6,6 @@ import argparse
 
 import numpy as np
 import torch
-from scipy.signal import lfilter, resample_poly
 from torch import nn
 
 from ..mospa import sounds
@@ -18,16 +17,16 @@ from ..train.loop import Loop
 from ..train.sizes import convolutions
 from ..train.team import Team
 from . import ears
+from .variety import varied
 
 CHANNELS, FEATURES = (16, 32, 48, 64, 96, 96, 96), 32
 SILENCE = sounds.CLASSES.index("silence")
 LATE = 3        # frames of a sound before its class can be told
-SPEEDS = ((1, 1), (9, 10), (10, 9), (10, 11), (11, 10), (8, 9), (9, 8), (7, 8), (8, 7))     # of a recording, with its pitch
 
 
 class Batches:
-    """Cuts of a sound that begins somewhere in them, at the levels of 1 to 5 m, on a quiet ground. `vary`: played faster or slower, brighter or
-    duller, over another one at times: there are two dozen recordings of a class."""
+    """Cuts of a sound that begins somewhere in them, at the levels of 1 to 5 m, on a quiet ground. `vary`: as other recordings of its class might be
+    (`variety`), over another one at times."""
 
     def __init__(self, heard, frames, seed=0, vary=False):
         self.heard, self.frames, self.rng, self.vary = heard, frames, np.random.default_rng(seed), vary
@@ -37,10 +36,7 @@ class Batches:
         y = y * 10 ** ((sounds.LEVEL[kind] + self.rng.uniform(-6, 6) - 94) / 20) / self.rng.uniform(1, 5)
         first = int(self.rng.integers(0, max(1, len(y) - 12 * FRAME_SAMPLES))) if self.rng.random() < 0.4 else 0
         y = y[first:first + 2 * self.frames * FRAME_SAMPLES]
-        if self.vary:
-            up, down = SPEEDS[self.rng.integers(len(SPEEDS))]
-            y = lfilter([1.0, self.rng.uniform(-0.5, 0.5)], [1.0, self.rng.uniform(-0.4, 0.4)], resample_poly(y, up, down))
-        return y
+        return varied(self.rng, y) if self.vary else y
 
     def batch(self, size):
         """Squashed waves [B, 800 T], classes [B, T], and how much each frame's counts [B, T]."""
@@ -52,9 +48,9 @@ class Batches:
                 y, first = self._sound(sounds.CLASSES[kind]), int(self.rng.integers(0, self.frames // 2))
                 y = y[:n - first * FRAME_SAMPLES]
                 waves[i, first * FRAME_SAMPLES:first * FRAME_SAMPLES + len(y)] = y
-                if self.vary and self.rng.random() < 0.2:
+                if self.vary and self.rng.random() < 0.3:
                     other = self._sound(sounds.CLASSES[int(self.rng.integers(SILENCE))])[:n]
-                    waves[i, :len(other)] += other * 0.1 * np.sqrt((np.square(y).mean() + 1e-12) / (np.square(other).mean() + 1e-12))
+                    waves[i, :len(other)] += other * self.rng.uniform(0.05, 0.25) * np.sqrt((np.square(y).mean() + 1e-12) / (np.square(other).mean() + 1e-12))
                 last = first + -(-len(y) // FRAME_SAMPLES)
                 kinds[i, first:last] = kind
                 weights[i, first:first + LATE] = 0

@@ -40,15 +40,15 @@ class Event:
 class Room:
     """The sounds of a clip of `frames` frames. `heard`: `mospa.sounds.Sounds`; `dances`: layers (`rest.Rest`) with their names."""
 
-    def __init__(self, rng, frames, heard, dances, genre=None, classes=None):
+    def __init__(self, rng, frames, heard, dances, genre=None, classes=None, first=FIRST, pause=PAUSE):
         self.rng, self.frames, self.dances = rng, frames, dances
         self.genre = genre or GENRES[rng.integers(len(GENRES))]
-        self.events, t = [], int(FPS * rng.uniform(*FIRST))
+        self.events, t = [], int(FPS * rng.uniform(*first))
         classes = list(classes or [c for c in CLASSES if c != "silence"])
         while t < frames - 3 * FPS:
             event = self._event(classes[rng.integers(len(classes))], heard, t)
             self.events.append(event)
-            t = max(event.end, event.until) + int(FPS * rng.uniform(*PAUSE))
+            t = max(event.end, event.until) + int(FPS * rng.uniform(*pause))
 
     def _event(self, kind, heard, onset):
         rng = self.rng

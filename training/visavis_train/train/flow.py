@@ -156,6 +156,7 @@ def main():
     parser.add_argument("--corpus", help="corpus of the cache, for --end-to-end")
     parser.add_argument("--live", type=int, help="windows of a batch whose voices --end-to-end hears, others taking cached features [all]")
     parser.add_argument("--react", type=float, default=0.0, help="blocks in which the body reacts to a sound weigh 1 + REACT [0]")
+    parser.add_argument("--turn", type=float, default=0.0, help="blocks in which the body turns weigh 1 + TURN [0]")
     parser.add_argument("--fresh", type=float, default=1.0, help="factor on the learning rate of what embeds sounds [1]")
     parser.add_argument("--sounds", type=float, default=1.0, help="how much more often windows with sounds are drawn than their length says [1]")
     parser.add_argument("--init", help="flow checkpoint whose weights to start from")
@@ -195,7 +196,7 @@ def main():
         apart = team.draw(args.seed, step) < share  # the same regime in all processes: none waits for the dearer one
         place = train.draw(args.batch)
         z, cond = train.batch(args.batch, place)
-        weight = 1 + args.still * train.stillness(*place) + args.react * train.reacting(*place)
+        weight = 1 + args.still * train.stillness(*place) + args.react * train.reacting(*place) + args.turn * train.turning(*place)
         loss = kinds[apart](net, z, cond, metric, args.slip, weight / weight.mean(), args.late)
         loop.update(loss, **{"apart" if apart else "shared": loss})
         loop.report(100, measure, 500)

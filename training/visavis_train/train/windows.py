@@ -1,4 +1,6 @@
 """Windows of the cache as training batches for the flow: latents and conditioning, with modality dropout."""
+import math
+
 import torch
 import torch.nn.functional as F
 
@@ -10,6 +12,7 @@ from .data import Split
 from .geometry import to_local
 
 CONTEXT = 8  # frames that an audio encoder in training hears before a window: a quarter of a second, more than it looks back
+TURNS = 0.4  # rad/s of the heading: a body that turns, not one that sways
 SMOOTH = (1, 30, 60, 120)  # frames over which the gaze score is averaged; drawn as often as the window's mean
 
 
@@ -106,6 +109,11 @@ class Windows:
         if not self.sound_features:
             return 0.0
         return self.reacts[self.frames(segment, at)[:, 4:]].float().unflatten(1, (self.blocks, 4)).mean(-1)
+
+    def turning(self, segment, at):
+        """Blocks [B, K] in which the body turns at TURNS or faster, 0 or 1."""
+        yaw = self.roots[self.frames(segment, at)[:, 3::4], 2].diff(dim=1)
+        return (torch.remainder(yaw + math.pi, 2 * math.pi) - math.pi).abs().ge(TURNS * 4 / 30).float()
 
     def hear(self, segment, at):
         """Agent's and user's features [B, K, 4 D_a] each, straight from the voices."""
