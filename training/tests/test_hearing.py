@@ -12,7 +12,7 @@ from standins import fake_sources
 from visavis_train import bundle as bundles
 from visavis_train import goldens
 from visavis_train.corpus import plausible, simulate, store
-from visavis_train.hearing import corpus, ears
+from visavis_train.hearing import appraise, corpus, ears, rooms, variety
 from visavis_train.hearing.events import Event, Room
 from visavis_train.mospa.react import REACTIONS
 from visavis_train.nets.appraisal import Appraisal
@@ -239,3 +239,36 @@ def test_a_target_of_the_gaze_is_for_conversation(tmp_path):
     reacts = torch.tensor(np.load(folder / "hear_0.npz")["reacts"])
     assert reacts.any() and kept["gaze"][reacts].std() < 1e-6 and torch.equal(kept["gaze"][~reacts], clips.gaze[~reacts])
     assert kept["sound"].shape == (900, 3) and kept["known"].any() and kept["levels"].min() > -2
+
+
+def test_a_varied_sound_is_as_loud_as_before_and_another_one_each_time():
+    y = np.random.default_rng(0).standard_normal(24000)
+    several = [variety.varied(np.random.default_rng(i), y) for i in range(8)]
+    assert len({len(v) for v in several}) > 3 and all(0.79 * len(y) <= len(v) <= 1.26 * len(y) for v in several)
+    assert np.allclose([np.sqrt(np.square(v).mean()) for v in several], np.sqrt(np.square(y).mean()), rtol=1e-3)
+    bright = [np.abs(np.diff(v)).mean() for v in several]
+    assert max(bright) > 1.2 * min(bright)
+
+
+def test_rooms_have_sounds_where_their_events_say_and_streams_learn_from_them(tmp_path):
+    made, h = rooms.room(np.random.default_rng(4), Sounds(), "sensitive")
+    assert len(made.events) >= 2
+    for e in made.events:
+        assert h.levels[e.onset + 2].max() > h.levels[e.onset - 2].max() + 0.5
+    events = [{k: getattr(e, k) for k in ("reaction", "onset", "end", "until")} for e in made.events]
+    path = str(tmp_path / "rooms.pt")
+    common.save(path, sound=torch.zeros(rooms.FRAMES, 3).half(), levels=torch.tensor(h.levels), sensitivity=torch.tensor([1.0]), starts=torch.tensor([0, rooms.FRAMES]), events=json.dumps([events]))
+    streams = appraise.Streams.of_rooms(path)
+    first = made.events[0]
+    assert (streams.label[:first.onset] == 0).all() and (streams.label[first.onset:first.until] == REACTIONS.index(first.reaction)).all()
+    assert (streams.count[first.onset:first.onset + appraise.LEAVE] == 0).all() and streams.count[first.onset + appraise.LEAVE] == 4
+    x, label, count = streams.batch(5)
+    assert x.shape == (5, appraise.FRAMES, 6) and label.shape == count.shape == (5, appraise.FRAMES) and (x[..., -1] == 1).all()
+
+
+def test_what_calls_for_a_reaction_is_all_but_the_first_share():
+    frames = torch.zeros(2, 4, 5)
+    frames[0, :, 3], frames[1, :2, 3], frames[1, :, 4] = 1.0, 0.5, 0.5
+    sound = torch.cat([frames.flatten(1), torch.randn(2, 14)], 1)
+    assert torch.allclose(ears.called(sound, 5, 2), torch.tensor([0.0, 0.75]))
+    assert ears.called(sound[:, None].expand(-1, 3, -1), 5, 2).shape == (2, 3)

@@ -50,6 +50,14 @@ def made_windows(tmp_path, blocks=16, clips=2, frames=160, latent=8, **kw):
     return windows.Windows(path, blocks, **kw)
 
 
+def test_blocks_that_turn_are_told_from_those_that_sway(tmp_path):
+    w = made_windows(tmp_path, blocks=8, clips=1, jitter=False)
+    rate = torch.cat([torch.full((80,), 0.2), torch.full((80,), 0.6)])     # rad/s
+    w.roots[:, 2] = torch.remainder((rate.double() / 30).cumsum(0) + 3.0, 2 * math.pi)     # the heading wraps on the way
+    turns = w.turning(w.segments[:1], torch.tensor([w.segments[0, 3] // 2 - 5]))[0]
+    assert turns[0] == 0 and turns[-1] == 1 and turns.diff().abs().sum() == 1
+
+
 def test_compact_frames_expand_to_the_feature_vector():
     p, q = walker()
     c, roots = data.compact(p, q)

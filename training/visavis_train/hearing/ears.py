@@ -122,3 +122,9 @@ def vector(features, levels, place, known, root, sensitivity):
     sine, cosine = torch.where(near, 0.0, x / rho.clamp(min=1e-9)), torch.where(near, 1.0, z / rho.clamp(min=1e-9))
     told = torch.stack([torch.ones_like(x), sine, cosine, rho.clamp(min=0.3).log2() - 1, place[:, 1].double() - 1.5], 1) * known[:, None]
     return torch.cat([features.flatten(1), levels.flatten(1), told.to(features.dtype), sensitivity[:, None].to(features.dtype)], 1)
+
+
+def called(sound, features, count):
+    """How much sound vectors [..., S] of frames of `features` call for a reaction [...], 0 to 1: shares of all `count` reactions, which are the last of a
+    frame's, but that of the first, none."""
+    return 1 - sound[..., :4 * features].unflatten(-1, (4, features))[..., features - count].mean(-1)

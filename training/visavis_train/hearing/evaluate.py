@@ -120,7 +120,7 @@ def roll(b, w, chosen, student=False, seed=0, hears="sounds"):
             cond.user[:, k] = to_local(root, w.user[frames[:, 4 * k:4 * k + 4]][..., [0, 2]].double()).float().flatten(1)
             if hears == "sounds":
                 cond.sound[:, k] = w.room(segment, frames[:, 4 * k:4 * k + 4], root[:, None])[0][:, 0]
-            share = reaction(w, cond.sound[:, k], len(room["appraisal"]["reactions"])) * cond.heard[:, k, 0]
+            share = ears.called(cond.sound[:, now], w.sound_features, len(room["appraisal"]["reactions"])) * cond.heard[:, now, 0]
             new = stream.step(eps[:, now], cond.at(now), reacting(session["guidance"], share, room.get("guidance", 1.0)))
         x = b.unstandardise(decoder.step(placed(new)))
         path = integrate(x[..., :3].double(), root)
@@ -132,12 +132,6 @@ def roll(b, w, chosen, student=False, seed=0, hears="sounds"):
     r = b.config["rig"]
     score = gaze(roots.float(), x, user.float(), r["eyes"], r["head_back"])
     return to_world(roots, local_positions(x).double()), roots, score, facing(x, roots)
-
-
-def reaction(w, sound, count):
-    """How much sound vectors [B, S] call for a reaction [B], 0 to 1: shares of all `count` reactions, which are behind the features, but that of the first, none."""
-    frames = sound[:, :4 * w.sound_features].unflatten(1, (4, w.sound_features))
-    return 1 - frames[..., w.sound_features - count].mean(1)
 
 
 def silenced(w, sound):

@@ -15,7 +15,7 @@ def branches(cond, gaze):
 
 
 def combine(x1, count, guidance, gaze_guidance):
-    """x1 of the stacked branches [count * B, ...] -> guided x1 [B, ...]; `guidance`: one weight, or one a row [B, 1, 1]."""
+    """x1 of the stacked branches [count * B, ...] -> guided x1 [B, ...]; `guidance`: one weight, or one a token [B, T, 1]."""
     parts = x1.chunk(count)
     out = parts[0] + guidance * (parts[1] - parts[0])
     return out + gaze_guidance * (parts[2] - parts[1]) if count == 3 else out
@@ -29,8 +29,8 @@ def history_time(tau, tau_history=None, clean_from=0.0):
 
 
 def reacting(guidance, share, further):
-    """Guidance weights [B, 1, 1] while what is heard calls for a reaction, by `share` [B] 0 to 1: `guidance - 1` grows to `further` times that."""
-    return guidance + share[:, None, None] * (further - 1) * (guidance - 1)
+    """Guidance weights [B, T, 1] while what is heard calls for a reaction, by `share` [B, T] 0 to 1: `guidance - 1` grows to `further` times that."""
+    return guidance + share[..., None] * (further - 1) * (guidance - 1)
 
 
 class Sampler:

@@ -13,8 +13,10 @@ from dataclasses import replace
 import numpy as np
 import torch
 
+from ..hearing import ears
+from ..mospa.react import REACTIONS
 from ..nets.flow import GAZE, Condition
-from ..nets.stream import DecoderStream, Stream, branches, combine, history_time, midpoint
+from ..nets.stream import DecoderStream, Stream, branches, combine, history_time, midpoint, reacting
 from . import common
 from .cache import load_vae
 from .common import mixed
@@ -30,7 +32,8 @@ REST = 0.1  # a latent that changes by less from block to block [deviations] is 
 
 @torch.no_grad()
 def teach(net, history, eps, cond, gaze, guidance, gaze_guidance, steps=4, tau_history=None, clean_from=0.0):
-    """What the multi-step sampler makes of each block given its history: [B, T, Dz]. `tau_history`, `clean_from`: see `history_time`."""
+    """What the multi-step sampler makes of each block given its history: [B, T, Dz]. `guidance`: one weight, or one a token [B, T, 1]; `tau_history`,
+    `clean_from`: see `history_time`."""
     stacked, count = branches(cond, gaze), 3 if gaze else 2
 
     def evaluate(z, tau, slot):
@@ -163,6 +166,7 @@ def main():
     parser.add_argument("--tau-history", type=float, default=0.9)
     parser.add_argument("--guidance", type=float, default=1.5)
     parser.add_argument("--gaze-guidance", type=float, default=2.0)
+    parser.add_argument("--reaction-guidance", type=float, default=1.0, help="how many times as far the teacher is guided while a sound is reacted to [1]")
     parser.add_argument("--gaze-map", type=pairs, metavar="TARGET:ASKED,...", help="what the teacher is asked for where the student is asked for a "
                         "target (linear between), so that the student gives it: from roll-outs of the teacher")
     parser.add_argument("--clean-from", type=float, default=0.3,
@@ -208,7 +212,11 @@ def main():
                 place = windows.draw(args.teach)
                 history, cond = windows.batch(args.teach, place)
                 cond, eps = targets(cond, gaze), args.temperature * torch.randn_like(history)
-            wish = teach(teacher, history, eps, calibrated(cond, args.gaze_map) if gaze else cond, gaze, args.guidance, args.gaze_guidance,
+            guidance = args.guidance
+            if windows.sound_features:
+                share = ears.called(cond.sound, windows.sound_features, len(REACTIONS)) * cond.heard[..., 0]
+                guidance = reacting(guidance, share, args.reaction_guidance)
+            wish = teach(teacher, history, eps, calibrated(cond, args.gaze_map) if gaze else cond, gaze, guidance, args.gaze_guidance,
                          tau_history=args.tau_history, clean_from=args.clean_from)
             memory.add(place, history, eps, wish, cond, own)
         history, eps, wish, cond, own, where = memory.pick(args.teach, args.batch)
