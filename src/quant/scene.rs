@@ -70,6 +70,11 @@ impl Scene {
         self.blocks
     }
 
+    /// The sounds in the room.
+    pub fn sounds(&self) -> &[Sound] {
+        &self.sounds
+    }
+
     /// The gaze target.
     pub fn gaze(&self) -> Option<f32> {
         self.gaze

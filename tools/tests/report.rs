@@ -113,5 +113,25 @@ fn a_pair_without_latents_has_a_report() {
     assert!(output["rows"].as_u64().unwrap() > 0, "layers are heard: {output}");
     assert_eq!(json["speed"][1]["samplers"][0][0], "dram");
     let md = read("report.md");
+    assert!(json["numerics"]["sounds"] == 0 && !md.contains("sounds"), "{md}");
     assert!(md.contains("| dram |") && !md.contains("midpoint") && !md.contains("VAE"), "{md}");
+}
+
+/// Bundles that hear are compared while something sounds, and the report says so.
+#[test]
+fn a_pair_that_hears_is_told_from_one_that_does_not() {
+    let dir = Scratch::new("report-hearing");
+    let options = |scheme| Options { scheme, smallest: 0, keep: &[], calibration: None, budget: None };
+    let file = |name: &str, scheme| {
+        let bytes = quantise(&common::hearing_f32(), &options(scheme)).unwrap().bytes;
+        dir.file(name, bytes).to_str().unwrap().to_owned()
+    };
+    let (f16, i8) = (file("f16.safetensors", Scheme::F16), file("i8.safetensors", Scheme::I8));
+    let out = dir.path("out").to_str().unwrap().to_owned();
+    succeeds(&["report", "--reference", &f16, "--candidate", &i8, "--quick", "--out", &out]);
+    let read = |name: &str| std::fs::read_to_string(dir.path("out").join(name)).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&read("report.json")).unwrap();
+    let sounds = json["numerics"]["sounds"].as_u64().unwrap();
+    assert!(sounds > 0);
+    assert!(read("report.md").contains(&format!("{sounds} sounds around the agent")));
 }

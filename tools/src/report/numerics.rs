@@ -101,6 +101,9 @@ pub struct Numerics {
     pub level: String,
     /// Blocks of the sample conversation that were run.
     pub blocks: usize,
+    /// Sounds in the room that the bundles heard meanwhile; 0 of bundles without hearing.
+    #[serde(default)]
+    pub sounds: usize,
     /// The candidates.
     pub candidates: Vec<CandidateNumerics>,
 }
@@ -148,6 +151,11 @@ pub(super) fn measure(
         arch: std::env::consts::ARCH.to_owned(),
         level: kernels.level().to_string(),
         blocks: scene.blocks(),
+        sounds: if reference.engine.has_hearing() {
+            scene.sounds().iter().filter(|s| s.block < scene.blocks()).count()
+        } else {
+            0
+        },
         candidates: candidates.iter().map(one).collect::<Result<_>>()?,
     })
 }

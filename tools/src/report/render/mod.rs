@@ -28,10 +28,14 @@ pub(super) fn document(report: &Report) -> Document {
     } else {
         ("", ". These bundles are deterministic: they have no latents, samplers or noise.")
     };
+    let heard = match report.numerics.sounds {
+        0 => String::new(),
+        n => format!(" The bundles hear: {n} sounds around the agent were played to them."),
+    };
     d.text(format!(
         "Reference: {} (matrices {}), {}. CPU level {levels}. Sizes are against {:.2} MB, the reference's parameters as f32. \
          Errors are teacher-forced: every block is computed from the reference's past{noise}, over {} blocks of the \
-         sample conversation and as many with its voices exchanged{told}",
+         sample conversation and as many with its voices exchanged{told}{heard}",
         report.reference,
         report.reference_schemes,
         report.made_by,
