@@ -272,3 +272,14 @@ def test_what_calls_for_a_reaction_is_all_but_the_first_share():
     sound = torch.cat([frames.flatten(1), torch.randn(2, 14)], 1)
     assert torch.allclose(ears.called(sound, 5, 2), torch.tensor([0.0, 0.75]))
     assert ears.called(sound[:, None].expand(-1, 3, -1), 5, 2).shape == (2, 3)
+
+
+def test_a_cache_is_appraised_as_a_stream_is(tmp_path):
+    write_cache(tmp_path / "heard", True)
+    state, net = common.load(str(tmp_path / "heard" / "train.pt")), Appraisal(3, REACTIONS, width=8).eval()
+    made = cache.appraised(state, net)
+    assert made["sound"].shape == (800, 3 + len(REACTIONS)) and torch.equal(made["sound"][:, :3], state["sound"])
+    later = net.behind(state["sound"][400:].float(), state["levels"][400:], 1.0)         # the second clip, from its own beginning
+    assert torch.allclose(made["sound"][400:].float(), later, atol=2e-3)
+    assert made["silence"].shape == (3 + len(REACTIONS),) and abs(made["silence"][3:].sum() - 1) < 1e-5
+    assert torch.equal(made["z"], state["z"]) and torch.equal(made["levels"], state["levels"])

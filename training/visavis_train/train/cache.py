@@ -3,7 +3,7 @@
     python -m visavis_train.train.cache --corpus DIR --vae runs/vae.pt --audio runs/audio.pt --out runs/cache
 
 Writes OUT/{train,val}.pt. Latents are encoded at two phases (frame offsets 4 and 6), so that a window need not start where a clip does. With --hearing,
-of a corpus of `visavis_train.hearing.corpus`, also what was heard in the room. `--join A B` makes one cache of several.
+of a corpus of `visavis_train.hearing.corpus`, also what was heard in the room; `--appraise CACHE --appraisal A` lays behind it what it calls for. `--join A B` makes one cache of several.
 """
 import argparse
 import os
@@ -80,18 +80,15 @@ def features(audio, clip, frames):
 
 
 @torch.no_grad()
-def rooms(clips, encoder, gaze, appraisal=None):
+def rooms(clips, encoder, gaze):
     """What was heard in the room in each clip: features [N, D_s] f16, levels [N, 2], source [N, 3], known [N], where the body reacts [N], sensitivity
-    [clips], features of silence [D_s]; and the gaze score [N], its mean elsewhere in the clip while the body reacts: a target is for conversation. With an
-    `appraisal` its shares of the reactions are behind the features."""
+    [clips], features of silence [D_s]; and the gaze score [N], its mean elsewhere in the clip while the body reacts: a target is for conversation."""
     frames, told = [], gaze.clone()
     sensitivity = torch.zeros(len(clips))
     for i, path in enumerate(clips.paths):
         with np.load(path.replace(".safetensors", ".npz")) as kept:
             wave = torch.from_numpy(kept["wave"]).float() / 32767
             sound, rest = ears.listen(encoder, wave), [torch.from_numpy(kept[k]) for k in ("levels", "place", "known", "reacts")]
-            if appraisal is not None:
-                sound = appraisal.behind(sound, rest[0], kept["sensitivity"])
             frames.append([sound.half()] + rest)
             part, reacts = slice(int(clips.starts[i]), int(clips.starts[i + 1])), frames[-1][-1]
             sensitivity[i] = float(kept["sensitivity"])
@@ -99,10 +96,16 @@ def rooms(clips, encoder, gaze, appraisal=None):
             told[part] = torch.where(reacts, gaze[part][~reacts].mean(), gaze[part])
     sound, levels, source, known, reacts = (torch.cat(x) for x in zip(*frames))
     silence = ears.listen(encoder, torch.zeros(8 * ears.FRAME))
-    if appraisal is not None:
-        silence = appraisal.behind(silence, torch.full((8, 2), ears.SILENT), 0.0)
     return {"sound": sound, "levels": levels, "source": source, "known": known, "reacts": reacts, "sensitivity": sensitivity, "hears": torch.ones(len(clips), dtype=torch.bool),
             "silence": silence[-1], "gaze": told}
+
+
+def appraised(state, appraisal):
+    """A cache's tensors with the shares of the reactions behind the features of what is heard."""
+    spans = zip(state["starts"][:-1].tolist(), state["starts"][1:].tolist(), state["sensitivity"].tolist())
+    sound = [appraisal.behind(state["sound"][a:b].float(), state["levels"][a:b], s).half() for a, b, s in spans]
+    silence = appraisal.behind(state["silence"].expand(8, -1), torch.full((8, 2), ears.SILENT), 0.0)[-1]
+    return state | {"sound": torch.cat(sound), "silence": silence}
 
 
 def join(caches, split):
@@ -173,7 +176,8 @@ def main():
     parser.add_argument("--corpus")
     parser.add_argument("--join", nargs="+", metavar="CACHE", help="caches to make one of, instead of a corpus")
     parser.add_argument("--hearing", help="encoder of what is heard in the room (`hearing.encoder`), for a corpus with sounds")
-    parser.add_argument("--appraisal", help="what says which reaction that calls for (`hearing.appraise`), with --hearing")
+    parser.add_argument("--appraise", metavar="CACHE", help="cache to lay the answers of --appraisal behind, instead of a corpus")
+    parser.add_argument("--appraisal", help="what says which reaction a sound calls for (`hearing.appraise`)")
     parser.add_argument("--vae", help="needed without --latents-of")
     parser.add_argument("--audio", help="needed without --features-of")
     parser.add_argument("--out", required=True)
@@ -185,15 +189,16 @@ def main():
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
     args = parser.parse_args()
-    if not (args.corpus or args.join):
-        parser.error("give --corpus, or --join with caches")
-    if args.appraisal and not args.hearing:
-        parser.error("--appraisal needs --hearing")
+    if not (args.corpus or args.join or args.appraise):
+        parser.error("give --corpus, --join with caches, or --appraise with a cache")
+    if bool(args.appraisal) != bool(args.appraise):
+        parser.error("--appraise and --appraisal need each other")
     device, team = common.start_process(args), Team(args.workers)
     os.makedirs(args.out, exist_ok=True)
-    if args.join:
+    if args.join or args.appraise:
         for split in args.splits.split(","):
-            common.save(os.path.join(args.out, split + ".pt"), **join(args.join, split))
+            made = join(args.join, split) if args.join else appraised(common.load(os.path.join(args.appraise, split + ".pt")), appraise.load(args.appraisal))
+            common.save(os.path.join(args.out, split + ".pt"), **made)
         return
     standard = common.load(args.standard) if args.standard else None
     stats = (standard["latent_mean"], standard["latent_std"]) if standard else None
@@ -219,7 +224,7 @@ def main():
         if team.leads:
             shared = {name: getattr(clips, name).clone() for name in ("roots", "user", "gaze")}
             if args.hearing:
-                shared |= rooms(clips, load_audio(args.hearing), shared["gaze"], args.appraisal and appraise.load(args.appraisal))
+                shared |= rooms(clips, load_audio(args.hearing), shared["gaze"])
             common.save(os.path.join(args.out, split + ".pt"), names=clips.names, starts=clips.starts, has=clips.has, still=still(clips), **shared, **state)
             print(f"{split}: {len(clips)} clips, {int(clips.starts[-1]) / 108000:.2f} hours", flush=True)
     team.close()
