@@ -1,10 +1,9 @@
 """Windows of the cache as training batches for the flow: latents and conditioning, with modality dropout."""
-import math
-
 import torch
 import torch.nn.functional as F
 
 from ..hearing import ears
+from ..motion import rig
 from ..nets.flow import GAZE, Condition
 from . import common
 from .common import mixed
@@ -113,7 +112,7 @@ class Windows:
     def turning(self, segment, at):
         """Blocks [B, K] in which the body turns at TURNS or faster, 0 or 1."""
         yaw = self.roots[self.frames(segment, at)[:, 3::4], 2].diff(dim=1)
-        return (torch.remainder(yaw + math.pi, 2 * math.pi) - math.pi).abs().ge(TURNS * 4 / 30).float()
+        return rig.wrap(yaw).abs().ge(TURNS * 4 / 30).float()
 
     def hear(self, segment, at):
         """Agent's and user's features [B, K, 4 D_a] each, straight from the voices."""
