@@ -8,9 +8,9 @@ import torch
 from visavis_train import bundle, make_tiny
 from visavis_train.motion import features, rig
 from visavis_train.nets.audio import AudioEncoder
-from visavis_train.nets.flow import GAZE, Condition, FlowNet
+from visavis_train.nets.flow import GAZE, Condition, FlowNet, sound_width
 from visavis_train.nets.stream import Reference, branches
-from visavis_train.train import audio, cache, common, data, flow, geometry, student, vae, windows
+from visavis_train.train import audio, cache, common, data, flow, geometry, grow, student, vae, windows
 
 
 @pytest.fixture(autouse=True)
@@ -206,6 +206,25 @@ def test_flow_losses_fall_when_trained(tmp_path):
         optim.step()
         seen.append(loss.item())
     assert sum(seen[-10:]) < 0.9 * sum(seen[:10])
+
+
+def test_a_grown_flow_does_what_the_narrow_one_does_and_its_halves_learn_apart():
+    size = dict(layers=2, width=32, heads=4, mlp=2, tau_width=16, window_blocks=5, embed_latent=16, embed_user=8, embed_voice=12, embed_gaze=4)
+    net = make_tiny.lively(FlowNet(8, 6, **size, sound_features=5))
+    torch.nn.init.normal_(net.input_sound.weight)
+    wide, sizes = grow.grow(net, size, 3)
+    assert (sizes["width"], sizes["heads"], sizes["layers"], len(wide.layers)) == (64, 8, 3, 3)
+    cond = Condition(torch.randn(2, 9, 8), torch.randn(2, 9, 24), torch.randn(2, 9, 24), torch.rand(2, 9, 4), torch.ones(2, 9, 4),
+                     torch.randn(2, 9, sound_width(5)), torch.ones(2, 9, 1))
+    z, past, tau = torch.randn(2, 9, 8), torch.randn(2, 9, 8), torch.full((2, 1), 0.4)
+    run = lambda n: n.forward_pair(past, torch.full((2, 1), 0.9), z, tau, cond)
+    assert torch.allclose(run(wide), run(net), atol=2e-5) and run(net).std() > 0.01
+    run(wide).square().mean().backward()
+    one, other = wide.layers[0].fc1.weight.grad.chunk(2)
+    assert (one - other).norm() > 0.1 * one.norm()
+    assert wide.layers[2].mod.weight.grad.norm() > 0  # the gates of the new layer open
+    with pytest.raises(SystemExit, match="--layers"):
+        grow.grow(net, size, 1)
 
 
 def test_late_weights_are_one_on_average_and_weigh_velocities_alike():
