@@ -92,6 +92,11 @@ def load_flow(path, device="cpu"):
     return net.eval().to(device), state
 
 
+def described(state):
+    """What a checkpoint of a flow or student holds beside weights: its sizes, the standard of its latents, their metric."""
+    return {k: state[k] for k in ("size", "latent", "audio", "sound", "latent_mean", "latent_std", "metric") if k in state}
+
+
 def widened(weights, before, after):
     """Weights of a network that hears `before` features, for one that hears `after`: what is new counts for nothing at first."""
     name = "embed_sound.0.weight"

@@ -11,7 +11,7 @@ import torch
 
 from ..nets.flow import FlowNet
 from . import common
-from .flow import load_flow
+from .flow import described, load_flow
 
 
 def twice(weight, parts=1):
@@ -57,7 +57,7 @@ def main():
     net, state = load_flow(args.flow)
     wide, size = grow(net, state["size"], args.layers)
     weights = wide.state_dict()
-    common.save(args.out, net=weights, ema=weights, size=size, step=0, **{k: state[k] for k in ("latent", "audio", "sound", "latent_mean", "latent_std", "metric") if k in state})
+    common.save(args.out, net=weights, ema=weights, step=0, **described(state) | {"size": size})
     print(f"{args.out}: {sum(v.numel() for v in weights.values()) / 1e6:.1f} M weights, {size}")
 
 

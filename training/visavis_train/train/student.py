@@ -20,7 +20,7 @@ from ..nets.stream import DecoderStream, Stream, branches, combine, history_time
 from . import common
 from .cache import load_vae
 from .common import mixed
-from .flow import latent_metric, load_flow, noisy, x1_error
+from .flow import described, latent_metric, load_flow, noisy, x1_error
 from .geometry import integrate, to_local
 from .loop import Loop
 from .matching import Adversary, Critic, Judge
@@ -193,7 +193,7 @@ def main():
         raise SystemExit(f"{args.cache} standardises latents otherwise than {args.flow}: make it with --standard {args.flow}")
     if "metric" not in base:  # a bundle's
         base["metric"] = latent_metric(vae, mean, std, windows.batch(24)[0][:, :16], windows.mean.to(device), windows.std.to(device)).cpu()
-    metric, kept = base["metric"].to(device), {k: base[k] for k in ("size", "latent", "audio", "sound", "latent_mean", "latent_std", "metric") if k in base}
+    metric, kept = base["metric"].to(device), described(base)
     memory = Memory(windows, args.memory)
     decode = lambda z: vae.decoder(z * windows.std.to(device) + windows.mean.to(device)) * std + mean
     critic = Critic(load_flow(args.flow, device)[0].train(), teacher) if args.matching else None
