@@ -97,6 +97,8 @@ TRAINERS = {
                                              "--blocks", 20, "--memory", 3, "--matching", 0.5, "--adversarial", 0.1]),
     "decoder": (decoder, lambda r: ["--corpus", r / "corpus", "--cache", r / "cache", "--vae", r / "vae.pt", "--flow", r / "flow.pt", "--student",
                                     r / "student.pt", "--blocks", 8]),
+    "decoder-texture": (decoder, lambda r: ["--corpus", r / "corpus", r / "corpus", "--vae", r / "vae.pt", "--noise", 0, "--texture", 0.1, "--adversarial", 0.1,
+                                            "--blocks", 8]),
 }
 
 

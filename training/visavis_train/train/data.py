@@ -162,6 +162,18 @@ class Motions:
         return expand(self.frames[index.to(self.device)])
 
 
+class Several:
+    """Motions of several corpora, as many windows of each."""
+
+    def __init__(self, motions):
+        self.motions = motions
+
+    def sample(self, batch, frames):
+        n = len(self.motions)
+        parts = [m.sample((batch + n - 1 - i) // n, frames) for i, m in enumerate(self.motions) if batch > i]
+        return torch.cat(parts)
+
+
 def statistics(motions, stride=9, most=250000):
     """Mean and deviation per channel, and the frames they are of; a joint's 36 channels share one deviation, at least 0.02 m. The first frame of
     a clip, whose root has no displacement, is left out."""

@@ -5,7 +5,7 @@
 
 Half of a batch is corpus motion whose latents get noise like the flow's own errors, with the corpus as target. The other half are latents of
 roll-outs, which have no truth: there the decoder stays near what it was, with feet that it means to plant put still, bones of the
-rig's lengths, and accelerations (block borders weigh more) held down.
+rig's lengths, and accelerations (block borders weigh more) held down. `--texture` and `--adversarial`: `texture.py`.
 """
 import argparse
 
@@ -13,13 +13,14 @@ import torch
 
 from ..motion import rig
 from ..nets.vae import Vae
-from . import common
+from . import common, texture
 from .cache import load_vae
 from .common import mixed
-from .data import Motions
+from .data import Motions, Several
 from .flow import error_factor, load_flow
 from .geometry import FEET, ROOT, integrate, local_positions, to_world
 from .loop import Loop
+from .played import played
 from .student import Rollouts
 from .team import Team
 from .vae import channel_weights, evaluate, joint_weights, losses
@@ -69,8 +70,9 @@ class Free:
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    for name in ("corpus", "vae", "out"):
+    for name in ("vae", "out"):
         parser.add_argument(f"--{name}", required=True)
+    parser.add_argument("--corpus", required=True, nargs="+", help="several: each gives its part of a batch")
     parser.add_argument("--flow", help="whose errors the noise is like; not needed with --noise 0")
     parser.add_argument("--cache", help="needed with --flow or --student")
     parser.add_argument("--student", help="roll-outs are this network's; without it only noise like the flow's errors is used")
@@ -81,10 +83,14 @@ def main():
     parser.add_argument("--white", type=float, default=0.0, help="greatest white noise besides, in deviations of the latents [0]")
     parser.add_argument("--captured", type=float, default=3.0, help="captured takes are drawn this many times as often as their length says [3]")
     parser.add_argument("--temperature", type=float, default=0.75, help="scale of the roll-outs' noise, as sessions use it")
+    parser.add_argument("--texture", type=float, default=0.0, help="weight of the errors of differences in time, each joint in its own units [0]")
+    parser.add_argument("--adversarial", type=float, default=0.0, help="weight of a critic that tells decoded motion from recorded motion [0]")
+    parser.add_argument("--slope", type=float, default=0.01, help="weight of that critic's squared gradient at recorded motion, every fourth step [0.01]")
     common.arguments(parser, steps=500, lr=4e-4, batch=8)
     args = parser.parse_args()
     device, team, frames = common.start_process(args), Team(args.workers), 4 * args.blocks
-    train, held = (team.first(lambda: Motions(args.corpus, split, captured=args.captured, device=device)) for split in ("train", "val"))
+    open_all = lambda split: team.first(lambda: Several([Motions(c, split, captured=args.captured, device=device) for c in args.corpus]))
+    train, held = map(open_all, ("train", "val"))
     frozen, mean, std, first = load_vae(args.vae, device)
     frozen.requires_grad_(False)
     net, weights = Vae(len(mean), **first["size"]).to(device), channel_weights(len(mean)).to(device)
@@ -102,7 +108,14 @@ def main():
         student, state = load_flow(args.student, device)
         windows = Windows(f"{args.cache}/train.pt", 64, 0, 0, 0, 0, device=device)
         free = Free(Rollouts(windows, frozen, mean, std), student, state["tau_history"])
-    loop = Loop(team, net, args, warmup=50, average=0.995, memory=free, size=first["size"], mean=mean.cpu(), std=std.cpu())
+    units, critic = None, None
+    if args.texture or args.adversarial:
+        with torch.no_grad():
+            recorded = [played(train.sample(8, frames)) for _ in range(12)]
+        units = texture.Differences(torch.cat([p for p, _ in recorded]))
+        rows = torch.cat([texture.seen(*r) for r in recorded]).flatten(0, 1)
+        critic = texture.Critic(rows.mean(0), rows.std(0)).to(device) if args.adversarial else None
+    loop = Loop(team, net, args, warmup=50, average=0.995, memory=free, beside={"critic": critic} if critic else None, size=first["size"], mean=mean.cpu(), std=std.cpu())
     torch.manual_seed(1)
     check = (held.sample(24, frames) - mean) / std
     measure = lambda net: evaluate(net, check, mean, std)
@@ -128,6 +141,14 @@ def main():
         parts |= {k: args.smooth * parts[k] for k in ("velocity", "acceleration")}
         if free:
             parts |= {k: args.free * v for k, v in free_losses(y[count:], before, mean, std, weights).items()}
+        if units:
+            (p, heading), made = played(x * std + mean), played(y * std + mean)
+            if args.texture:
+                parts["texture"] = args.texture * units.loss(p, made[0][:count])
+            if critic:
+                real, shown = texture.seen(p, heading), texture.seen(*made)
+                parts["adversarial"] = -args.adversarial * texture.frozen(critic, shown).mean()
+                parts["told"] = texture.told(critic, real, shown, args.slope if step % 4 == 0 else 0.0)
         loop.update(sum(parts.values()), **parts)
         loop.report(50, measure, 100)
     loop.finish(measure)
