@@ -11,10 +11,14 @@ import { fileURLToPath } from "node:url";
 import { gzipSync } from "node:zlib";
 
 const here = dirname(fileURLToPath(import.meta.url)), root = join(here, "../.."), out = resolve(process.argv[2] ?? join(root, "out/web"));
-// The agent's models, of which the first begins: VISAVIS_BUNDLES (paths, separated by spaces), else those of models/, quantised where they are so too.
-const stems = readdirSync(join(root, "models")).filter((name) => name.endsWith(".safetensors")).map((name) => name.slice(0, -".safetensors".length));
-const shipped = stems.filter((stem) => !stems.includes(`${stem}-i8`)).sort((a, b) => b.includes("base") - a.includes("base"));
-const bundles = process.env.VISAVIS_BUNDLES?.split(" ").filter(Boolean) ?? shipped.map((stem) => join(root, "models", `${stem}.safetensors`));
+const configOf = (path) => {
+  const bytes = readFileSync(path), header = bytes.subarray(8, 8 + Number(bytes.readBigUInt64LE()));
+  return JSON.parse(JSON.parse(header.toString()).__metadata__.visavis);
+};
+// The agent's models, of which the first begins: VISAVIS_BUNDLES (paths, separated by spaces), else the quantised ones of models/ that stream, the default first.
+const shipped = () => readdirSync(join(root, "models")).filter((name) => name.endsWith("-i8.safetensors")).map((name) => join(root, "models", name))
+  .filter((path) => configOf(path).kind !== "mospa").sort((a, b) => b.includes("room") - a.includes("room"));
+const bundles = process.env.VISAVIS_BUNDLES?.split(" ").filter(Boolean) ?? shipped();
 const pack = join(out, "npm"), tools = join(out, "build"), modules = join(tools, "node_modules");
 mkdirSync(tools, { recursive: true });
 copyFileSync(join(here, "package.json"), join(tools, "package.json"));
@@ -59,10 +63,6 @@ function sentences() {
 }
 
 // What its panel says of a bundle. All have the body that the page builds from the first.
-const configOf = (path) => {
-  const bytes = readFileSync(path), header = bytes.subarray(8, 8 + Number(bytes.readBigUInt64LE()));
-  return JSON.parse(JSON.parse(header.toString()).__metadata__.visavis);
-};
 function model(path) {
   const { name, kind = "sarah", rig, hearing } = configOf(path);
   if (JSON.stringify(rig) !== JSON.stringify(configOf(bundles[0]).rig)) throw new Error(`${path} has another rig than ${bundles[0]}: build a page of its own`);

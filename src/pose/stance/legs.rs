@@ -1,5 +1,6 @@
 //! The leg of a planted foot: what the root cannot take up.
 
+use super::super::fit::swing;
 use super::ik::reach;
 use super::{Contact, HEIGHT, earlier, fade, floor, turn, turned};
 use crate::frame::Transform;
@@ -46,8 +47,8 @@ impl Leg {
         self.shown = points;
     }
 
-    /// Moves the leg in `joints` so that a planted foot is shown where it was shown in the frame
-    /// before. `before` and `now` are heel and toes as decoded, each in the heading frame of its
+    /// Moves the leg in `joints` so that a planted foot is shown on the floor, where it was shown in
+    /// the frame before. `before` and `now` are heel and toes as decoded, each in the heading frame of its
     /// frame; `step`, corrected, lies between.
     pub(super) fn hold(
         &mut self,
@@ -58,15 +59,18 @@ impl Leg {
         step: [f32; 3],
     ) {
         let low = contact.low;
-        let planted = contact.planted(earlier(now[low], step) - floor(before[low]));
+        let slide = earlier(now[low], step) - floor(before[low]);
+        let planted = contact.planted(slide);
         // A foot on its toes turns about them: its direction is held as far as both are down.
         let flat = planted * fade(contact.clearance[1 - low], HEIGHT);
+        let down = contact.down(slide);
+        let sole = tipped(now[1] - now[0], down[0] - down[1]);
         // Everything below is in this frame's heading frame.
         let later = |p: Vec3| turned(floor(p) - Vec2::new(step[0], step[1]), -step[2]);
         let shown = self.shown.map(later);
         self.moved = turned(self.moved, -step[2]);
 
-        let line = floor(now[1]) - floor(now[0]);
+        let line = floor(sole);
         self.twisted -= flat * turn(shown[1] - shown[0], turned(line, self.twisted));
         let place = |moved: Vec2, twisted: f32| {
             let heel = floor(now[0]) + moved;
@@ -77,14 +81,13 @@ impl Leg {
         self.moved = (keep * self.moved).clamp_length_max(FURTHEST);
         self.twisted = ((1.0 - RELEASE * (1.0 - flat)) * self.twisted).clamp(-MOST_TURNED, MOST_TURNED);
 
-        let lift = (-contact.clearance[low]).max(0.0);
-        let target = now[0] + Vec3::new(self.moved.x, lift, self.moved.y);
-        self.shown = self.place(joints, target);
+        let target = now[0] + Vec3::new(self.moved.x, -down[0], self.moved.y);
+        self.shown = self.place(joints, target, sole);
     }
 
-    /// Puts the ankle at `target` as far as the leg reaches, turns the foot, and tells where heel
-    /// and toes are then.
-    fn place(&self, joints: &mut [Transform], target: Vec3) -> [Vec3; 2] {
+    /// Puts the ankle at `target` as far as the leg reaches, turns the foot so that `sole`, turned
+    /// by the twist, goes from heel to toes, and tells where these are then.
+    fn place(&self, joints: &mut [Transform], target: Vec3, sole: Vec3) -> [Vec3; 2] {
         let [hips, upper, lower, foot, toes] = self.chain;
         let at = |j: usize| joints[j].position;
         let forward = joints[hips].rotation * Vec3::Z;
@@ -92,11 +95,24 @@ impl Leg {
             return [at(foot), at(toes)];
         };
         let twist = Quat::from_rotation_y(self.twisted);
-        let tip = leg.ankle + twist * (at(toes) - at(foot));
-        for (j, turn) in [(upper, leg.turns[0]), (lower, leg.turns[1]), (foot, twist), (toes, twist)] {
+        let turned = twist * swing(at(toes) - at(foot), sole);
+        let tip = leg.ankle + twist * sole;
+        for (j, turn) in [(upper, leg.turns[0]), (lower, leg.turns[1]), (foot, turned), (toes, turned)] {
             joints[j].rotation = (turn * joints[j].rotation).normalize();
         }
         (joints[lower].position, joints[foot].position, joints[toes].position) = (leg.knee, leg.ankle, tip);
         [leg.ankle, tip]
     }
+}
+
+/// The way from heel to toes `sole` with the toes `up` higher, as far as its length allows; one that
+/// has no direction on the floor is left as it is.
+fn tipped(sole: Vec3, up: f32) -> Vec3 {
+    let (length, along) = (sole.length(), floor(sole).length());
+    if up == 0.0 || along < 0.1 * length {
+        return sole;
+    }
+    let y = (sole.y + up).clamp(-length, length);
+    let share = (length * length - y * y).max(0.0).sqrt() / along;
+    Vec3::new(share * sole.x, y, share * sole.z)
 }

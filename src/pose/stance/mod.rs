@@ -6,11 +6,12 @@
 //! | file | what |
 //! |---|---|
 //! | `root` | each step of the root is turned and moved by the motion of the planted feet: where the body is in the world cannot be seen, a sliding foot can |
-//! | `legs` | what is left, since two feet do not agree on one root, is taken up by the legs: each planted foot keeps its place and direction on the floor |
+//! | `legs` | what is left, since two feet do not agree on one root, is taken up by the legs: each planted foot is put on the floor, where it keeps its place and direction |
 //! | `ik` | the leg that puts an ankle where it should be |
 //!
 //! A foot is planted as far as its lowest point, heel or toes, is near the floor and slow; both
-//! fade, so that nothing jumps when a foot lands or lifts. Feet below the floor are lifted onto it.
+//! fade, so that nothing jumps when a foot lands or lifts. Heel and toes come down to the floor, each as
+//! far as it is near and the foot slow; feet below the floor are lifted onto it.
 
 mod ik;
 mod legs;
@@ -117,8 +118,19 @@ impl Contact {
     /// How much a foot stands whose lowest point moved by `slide` (metres) over the floor in a
     /// frame, 0 to 1.
     fn planted(&self, slide: Vec2) -> f32 {
-        fade(self.clearance[self.low], HEIGHT) * fade(slide.length() * FPS as f32, SPEED)
+        fade(self.clearance[self.low], HEIGHT) * slow(slide)
     }
+
+    /// How far heel and toes go down, metres, where the lowest point moved by `slide`: to the floor,
+    /// as far as each is near it; negative below it.
+    fn down(&self, slide: Vec2) -> [f32; 2] {
+        self.clearance.map(|c| if c > 0.0 { fade(c, HEIGHT) * slow(slide) * c } else { c })
+    }
+}
+
+/// How much a point that moved by `slide` (metres) over the floor in a frame stands, 0 to 1.
+fn slow(slide: Vec2) -> f32 {
+    fade(slide.length() * FPS as f32, SPEED)
 }
 
 /// The floor coordinates `(x, z)` of a point of this frame's heading frame, in that of the frame

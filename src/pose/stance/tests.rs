@@ -165,6 +165,50 @@ fn feet_do_not_go_through_the_floor() {
 }
 
 #[test]
+fn a_foot_that_hovers_is_put_down() {
+    let rest = shown(1, |_| [Vec3::new(0.1, 0.0, 0.0), Vec3::new(-0.1, 0.0, 0.0)])[0][0].y;
+    let way = shown(20, |_| [Vec3::new(0.1, 0.012, 0.0), Vec3::new(-0.1, 0.0, 0.0)]);
+    assert!(way[1..].iter().flatten().all(|ankle| (ankle.y - rest).abs() < 1e-4), "{:?}", way[19]);
+}
+
+#[test]
+fn a_foot_that_lifts_or_lands_does_not_jump() {
+    // Up by 12 cm and down again, 8 mm a frame at most.
+    let height = |i: usize| 0.06 * (1.0 - (i as f32 * std::f32::consts::TAU / 48.0).cos());
+    let way = shown(97, |i| [Vec3::new(0.1, height(i), 0.0), Vec3::new(-0.1, 0.0, 0.0)]);
+    let steps = way.windows(2).map(|pair| (pair[1][0].y - pair[0][0].y).abs());
+    let most = steps.skip(1).fold(0.0, f32::max);
+    assert!(most < 0.02, "{most}");
+    assert!((way[24][0].y - way[24][1].y - 0.12).abs() < 1e-3, "free in the air: {:?}", way[24]);
+}
+
+#[test]
+fn a_tipped_foot_is_put_flat_and_one_on_its_toes_is_not() {
+    let rig = Rig::humanoid();
+    let [.., ankle, toes] = LEGS[0].map(|name| rig.index(name).unwrap());
+    let feet = [Vec3::new(0.1, 0.0, 0.0), Vec3::new(-0.1, 0.0, 0.0)];
+    let heights = |joints: &[Transform]| [ankle, toes].map(|j| joints[j].position.y);
+    let rest = heights(&standing(&rig, feet));
+    for (tip, put) in [(0.01, true), (-0.01, true), (-0.06, false)] {
+        let mut stance = Stance::new(&rig);
+        let mut off = [0.0; 2];
+        for _ in 0..3 {
+            let mut joints = standing(&rig, feet);
+            // About the heel where the toes are up, about the toes where the heel is.
+            if tip > 0.0 {
+                joints[toes].position.y += tip;
+            } else {
+                joints[ankle].position.y -= tip;
+            }
+            stance.hold(&mut joints, [0.0; 3]);
+            let shown = heights(&joints);
+            off = [0, 1].map(|i| shown[i] - rest[i]);
+        }
+        assert_eq!(off[0].abs().max(off[1].abs()) < 1e-4, put, "{tip}: {off:?}");
+    }
+}
+
+#[test]
 fn legs_reach_as_far_as_they_are_long() {
     let leg = [Vec3::new(0.0, 0.9, 0.0), Vec3::new(0.0, 0.49, 0.08), Vec3::new(0.0, 0.08, 0.0)];
     let same = reach(leg, leg[2], Vec3::Z).unwrap();
