@@ -3,7 +3,7 @@
 use crate::metrics::bone_deviation;
 use visavis::internals::kernels::Kernels;
 use visavis::internals::pose::{Fit, root_of};
-use visavis::{Frame, Result, Rig};
+use visavis::{FPS, Frame, Result, Rig};
 
 /// A motion in a window, as it is measured and kept.
 ///
@@ -27,7 +27,9 @@ impl Played {
     /// Motion of the runtime, which has fitted the rig.
     pub(super) fn shown(rig: &Rig, frames: Vec<Frame>) -> Self {
         let mut this = Self::recorded(rig, frames);
-        for frame in &mut this.frames {
+        for (i, frame) in this.frames.iter_mut().enumerate() {
+            // Blocks begin at multiples of four, here and where a window begins in a session.
+            (frame.index, frame.time) = (i as u64, i as f64 / f64::from(FPS));
             rig.fk(frame.hips, &frame.local, &mut frame.global);
             frame.root = root_of(&frame.global[0], frame.root.yaw);
         }

@@ -57,6 +57,7 @@ fn a_report_is_whole_and_the_same_on_any_number_of_threads() {
     let missed = |what: &str| report.verdicts.iter().find(|v| v.what.starts_with(what)).unwrap().met == Some(false);
     assert!(missed("FGD, midpoint1") && missed("VAE, joints"), "{:#?}", report.verdicts);
 
+    assert!(report.rows.iter().all(|row| row.all.seam.is_some()), "all motion has blocks");
     let json: serde_json::Value = serde_json::from_str(&report.to_json()).unwrap();
     assert_eq!(json["rows"].as_array().unwrap().len(), report.rows.len());
     for text in [report.to_text(), report.to_markdown()] {
