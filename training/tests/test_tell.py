@@ -40,7 +40,7 @@ def test_fidgeting_is_told_and_the_same_motion_is_not():
 
 
 def test_a_source_is_in_one_half():
-    sources = list("aaaabbbccddef")
+    sources = list("aaabbbccddef")
     half = tell.halves(sources)
     assert all(len({bool(h) for h, s in zip(half, sources) if s == source}) == 1 for source in sources)
     assert abs(int(half.sum()) - int((~half).sum())) <= 1

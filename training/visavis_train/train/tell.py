@@ -95,7 +95,7 @@ def halves(sources):
 
 
 def others(sources, half):
-    """For each of N pieces one of another source of the same half, each once: a permutation [N]."""
+    """For each of N pieces one of another source of the same half, each once: a permutation [N]. No source may have more than half of a half."""
     out = torch.arange(len(sources))
     for side in (False, True):
         at = sorted((i for i in range(len(sources)) if half[i] == side), key=lambda i: sources[i])
