@@ -27,13 +27,31 @@ impl Engine {
     /// not finite.
     #[doc(hidden)]
     pub fn round_trip(&self, frames: &[Frame]) -> Result<Vec<Frame>> {
+        self.through(frames, pose::Decoder::new(self.kernels, &self.config.rig, self.config.pose.radius))
+    }
+
+    /// As [`Engine::round_trip`], shown as a session shows what it decodes: guarded, borders
+    /// bridged, feet held.
+    ///
+    /// # Errors
+    /// As [`Engine::round_trip`].
+    #[doc(hidden)]
+    pub fn round_trip_shown(&self, frames: &[Frame]) -> Result<Vec<Frame>> {
         let rig = &self.config.rig;
-        let radius = self.config.pose.radius;
+        let mut motion = pose::Decoder::new(self.kernels, rig, self.config.pose.radius).with_guard().with_stance(rig);
+        if self.config.session.bridge > 0.0 {
+            motion = motion.with_bridge(rig, self.config.session.bridge);
+        }
+        self.through(frames, motion)
+    }
+
+    fn through(&self, frames: &[Frame], mut motion: pose::Decoder) -> Result<Vec<Frame>> {
+        let rig = &self.config.rig;
         let sarah = self.sarah()?;
         let width = sarah.features();
         let mut exec = self.exec(1)?;
         let mut networks = RoundTrip::new(self.encoder()?, &sarah.decoder, sarah.latent.width(), KvDtype::F32);
-        let (mut features, mut motion) = (pose::Encoder::new(radius), pose::Decoder::new(self.kernels, rig, radius));
+        let mut features = pose::Encoder::new(self.config.pose.radius);
         motion.reset(frames.first().map(|f| f.root).unwrap_or_default());
         let mut metric = Metric::zeros(BLOCK_FRAMES * width);
         let [mut x, mut y] = [(); 2].map(|()| Standardised::zeros(BLOCK_FRAMES * width));

@@ -92,6 +92,19 @@ impl Fit {
         }
     }
 
+    /// Fits the rig to the joints of `frame` in the world, and fills its `hips`, `local` and
+    /// `fit_error`. Allocates, unlike what sessions do.
+    ///
+    /// # Panics
+    /// If it has not J joints.
+    #[cfg(feature = "internals")]
+    pub fn fit(&mut self, frame: &mut Frame) {
+        let joints = std::mem::take(&mut frame.global);
+        self.turn(&mut vec![Transform::IDENTITY; joints.len()], &joints, &Root::default(), frame);
+        self.sign(frame);
+        frame.global = joints;
+    }
+
     /// Gives the rotations of `frame` the signs of the frame before.
     pub(super) fn sign(&mut self, frame: &mut Frame) {
         follow(&mut self.previous, frame.local.iter_mut());

@@ -115,3 +115,29 @@ fn eval_judges_a_bundle_and_writes_reports() {
     let said = cli::fails(1, &["eval", "--model", TINY, "--clips", wrong.to_str().unwrap()]);
     assert!(said.contains("clip.safetensors"), "{said}");
 }
+
+#[test]
+fn eval_keeps_motion_and_judges_what_others_made() {
+    let scratch = Scratch::new("files-keep");
+    let kept = scratch.path("kept");
+    let eval = ["eval", "--model", TINY, "--quick", "--motion-only", "--windows", "1", "--sampler", "single"];
+    let with = |args: &[&str]| [&eval[..], args].concat();
+    succeeds(&with(&["--keep", kept.to_str().unwrap()]));
+    assert!(kept.join("corpus/000.safetensors").is_file() && kept.join("VAE/000.safetensors").is_file());
+
+    let row = |name: &str, folder: &str| format!("{name}={}", kept.join(folder).display());
+    let (mine, truth) = (row("mine", "single"), row("truth", "corpus"));
+    let text = succeeds(&with(&["--row", &mine, "--row", &truth]));
+    let figures = |row: &str| {
+        let line = text.lines().find(|line| line.starts_with(&format!("{row} "))).unwrap_or_else(|| panic!("{text}"));
+        line.trim_start_matches(row).trim().to_owned()
+    };
+    assert_eq!(figures("mine"), figures("single"));
+    assert_eq!(figures("truth"), figures("corpus"));
+
+    let said = cli::fails(1, &with(&["--row", &row("mine", "nothing")]));
+    assert!(said.contains("no such folder"), "{said}");
+    let said = cli::fails(1, &with(&["--keep", kept.to_str().unwrap()]));
+    assert!(said.contains("empty it"), "{said}");
+    assert!(cli::fails(2, &with(&["--row", "mine"])).contains("NAME=DIR"));
+}

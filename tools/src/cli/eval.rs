@@ -47,9 +47,19 @@ pub struct EvalArgs {
     /// A look: four windows and few, short runs
     #[arg(long)]
     pub quick: bool,
-    /// Only what bundles are compared by: motion with free gaze, and reconstruction
+    /// Only what bundles are compared by: motion with free gaze, and reconstruction; not Random and
+    /// NN, neither measured nor kept
     #[arg(long)]
     pub motion_only: bool,
+    /// Writes the motion of each row but those with gaze targets, as it is played: a clip for each
+    /// window, DIR/ROW/000.safetensors and on, of 400 frames in the space of the window's clip. ROW
+    /// is the row's name, - for a colon; the file tells clip and first frame, the corpus' ones also
+    /// hold voices and the user's head. DIR is new or empty
+    #[arg(long, value_name = "DIR")]
+    pub keep: Option<PathBuf>,
+    /// A row of motion made elsewhere: DIR holds a clip for each window, as --keep writes them
+    #[arg(long, value_name = "NAME=DIR", value_parser = row)]
+    pub row: Vec<(String, PathBuf)>,
     /// Seed of all windows; another one tells what chance alone changes
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u32,
@@ -59,6 +69,13 @@ fn temperature(text: &str) -> std::result::Result<f32, String> {
     number(text, 0.0, 2.0)
 }
 
+fn row(text: &str) -> std::result::Result<(String, PathBuf), String> {
+    match text.split_once('=') {
+        Some((name, dir)) if !name.is_empty() && !dir.is_empty() => Ok((name.to_owned(), dir.into())),
+        _ => Err("it is NAME=DIR, a row's name and the folder of its motion".to_owned()),
+    }
+}
+
 pub fn run(args: &EvalArgs) -> Result<()> {
     let engine = Engine::load(files::model(args.model.as_deref())?)?;
     let mut options = EvalOptions {
@@ -66,6 +83,8 @@ pub fn run(args: &EvalArgs) -> Result<()> {
         quick: args.quick,
         motion_only: args.motion_only,
         seed: args.seed,
+        rows: args.row.clone(),
+        keep: args.keep.clone(),
         session: SessionOptions {
             guidance: args.weights.guidance,
             gaze_guidance: args.weights.gaze_guidance,

@@ -13,6 +13,7 @@
 use crate::recording::Recording;
 use glam::{Quat, Vec3};
 use safetensors::{Dtype, tensor::Metadata};
+use std::collections::HashMap;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -30,6 +31,7 @@ const MAX_HEADER: u64 = 1 << 20;
 pub struct Clip {
     path: PathBuf,
     frames: usize,
+    notes: HashMap<String, String>,
     data: Data,
 }
 
@@ -111,13 +113,16 @@ impl Clip {
                 }
                 Some(info) => {
                     let (has, is) = (&info.shape, info.dtype);
-                    return Err(bad(format!("its tensor {name} is {is:?} {has:?}, not {dtype:?} {shape:?}")));
+                    return Err(bad(format!(
+                        "its tensor {name} is {is:?} {has:?}, not {dtype:?} {shape:?}: {frames} frames, {joints} joints"
+                    )));
                 }
                 None if i < 3 => return Err(bad(format!("it has no tensor {name} {shape:?}"))),
                 None => {}
             }
         }
-        Ok(Self { path: path.to_path_buf(), frames, data: Data::File { joints, at } })
+        let notes = metadata.metadata().clone().unwrap_or_default();
+        Ok(Self { path: path.to_path_buf(), frames, notes, data: Data::File { joints, at } })
     }
 
     /// The clips of a folder (its `.safetensors` files, by name), or the one file that `path` is.
@@ -146,12 +151,23 @@ impl Clip {
 
     /// A clip in memory.
     pub fn from_segment(name: &str, segment: Segment) -> Self {
-        Self { path: name.into(), frames: segment.frames.len(), data: Data::Memory(Arc::new(segment)) }
+        let (frames, data) = (segment.frames.len(), Data::Memory(Arc::new(segment)));
+        Self { path: name.into(), frames, notes: HashMap::new(), data }
     }
 
     /// Its file, or its name.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Its name, without the folder that it lies in.
+    pub fn name(&self) -> String {
+        self.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+    }
+
+    /// What its file says of `key` beside the tensors.
+    pub fn note(&self, key: &str) -> Option<&str> {
+        self.notes.get(key).map(String::as_str)
     }
 
     /// Its length, frames.
@@ -190,7 +206,7 @@ impl Clip {
             let values: Vec<f32> = bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
             match values.iter().all(|v| v.is_finite()) {
                 true => Ok(values),
-                false => Err(bad("it holds numbers that are not finite")),
+                false => Err(bad("it holds numbers that are not finite; write it again without them")),
             }
         };
         let samples = |bytes: Option<Vec<u8>>| {

@@ -1,13 +1,14 @@
 //! What motion measures, window by window, and what a row of the table says.
 
 use super::people::speech;
+use super::played::Played;
 use super::window::Window;
 use crate::metrics::{
     Liveliness, Moments, NodTally, Nods, Space, Split, Summary, Tally, acceleration_moments, ape, frechet, pck,
     pose_moments,
 };
 use serde::Serialize;
-use visavis::{Frame, Result, Rig};
+use visavis::{Result, Rig};
 
 /// Windows whose poses make up one batch of the mean Frechet distance: 3,200 frames.
 const BATCH: usize = 8;
@@ -26,6 +27,7 @@ pub(super) struct Measured {
     listening: Tally,
     talking: Tally,
     nods: NodTally,
+    bones: Option<f64>,
 }
 
 impl Measured {
@@ -34,8 +36,8 @@ impl Measured {
         self.summary.head_angle
     }
 
-    /// Measures `frames`, the motion in `window`.
-    pub(super) fn of(rig: &Rig, window: &Window, frames: Vec<Frame>) -> Result<Self> {
+    /// Measures the motion in `window`.
+    pub(super) fn of(rig: &Rig, window: &Window, Played { frames, bones }: Played) -> Result<Self> {
         let average = |values: Vec<f64>| mean(values.into_iter());
         let truth = &window.truth.frames;
         let (ape, pck) = (ape(&frames, truth, Space::Root)?, pck(&frames, truth, CORRECT, Space::Root)?);
@@ -51,6 +53,7 @@ impl Measured {
             listening,
             talking,
             nods,
+            bones,
             speaking: window.speaking,
             summary: Summary::of(&recording),
             poses: pose_moments(&recording.frames),
@@ -93,7 +96,7 @@ pub struct Figures {
     pub ape: Option<f64>,
     /// Share of keypoints within 10 cm of the corpus', 0 to 1 (DRAM eq. 11).
     pub pck: Option<f64>,
-    /// Mean deviation of bone lengths as decoded, relative.
+    /// Mean deviation of bone lengths before the fit, relative.
     pub bone_deviation: Option<f64>,
     /// Mean speed of all joints, m/s.
     pub joint_speed: Option<f64>,
@@ -106,6 +109,8 @@ pub struct Row {
     pub name: String,
     /// The gaze target that was asked for.
     pub gaze_target: Option<f32>,
+    /// Whether sessions of the bundle made it.
+    pub model: bool,
     /// Over all windows.
     pub all: Figures,
     /// Over the windows in which the agent speaks at least half of the time.
@@ -124,11 +129,17 @@ pub struct Row {
 }
 
 impl Row {
+    /// The same, made by sessions of the bundle.
+    pub(super) fn by_model(self) -> Self {
+        Self { model: true, ..self }
+    }
+
     pub(super) fn new(name: String, gaze_target: Option<f32>, motion: &[Measured], truth: &[Measured]) -> Self {
         let figures = |class: Option<bool>| Figures::new(motion, truth, class);
         Self {
             name,
             gaze_target,
+            model: false,
             all: figures(None),
             speaking: figures(Some(true)),
             non_speaking: figures(Some(false)),
@@ -168,7 +179,7 @@ impl Figures {
             beat_shuffled: average(&|m| Some(beat(m)?.shuffled)),
             ape: average(&|m| m.ape),
             pck: average(&|m| m.pck),
-            bone_deviation: average(&|m| Some(m.summary.bone_deviation?.mean)),
+            bone_deviation: average(&|m| m.bones),
             joint_speed: average(&|m| Some(m.summary.joint_speed?.mean)),
         }
     }

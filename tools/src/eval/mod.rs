@@ -1,13 +1,15 @@
 //! Is the motion any good? A bundle judged on recorded conversations.
 //!
 //! ```text
-//! clips -> windows -> rows: corpus, Random, NN, each sampler, each gaze target -> Report -> text, JSON, Markdown
+//! clips -> windows -> rows: corpus, Random, NN, VAE, samplers, made elsewhere, gaze targets
+//!                     -> Report -> text, JSON, Markdown; the motion itself as files
 //!                  -> reconstruction, reaction time, endurance, following        -> verdicts on the targets
 //! ```
 //!
 //! A [`Window`] is 13.3 s of a clip. The model is given its voices and the way of its user,
 //! starting where the clip's agent stands two seconds earlier; then all motions are measured over
-//! the same frames by the same code ([`crate::metrics`]), the corpus' own included. Everything is
+//! the same frames by the same code ([`crate::metrics`]), the corpus' own included, and motion that
+//! something else made. What is measured is what is played: joints on the rig. Everything is
 //! deterministic: same bundle, clips and options, same figures, on any number of threads.
 //!
 //! ```no_run
@@ -26,11 +28,15 @@
 mod bank;
 mod calibrate;
 mod clip;
+mod elsewhere;
 mod endurance;
 mod figures;
+mod keep;
 mod motion;
+mod options;
 mod parallel;
 mod people;
+mod played;
 mod reaction;
 mod reconstruction;
 mod report;
@@ -43,6 +49,7 @@ pub use calibrate::calibrate;
 pub use clip::{Clip, Segment};
 pub use endurance::{Change, Endurance, Follow};
 pub use figures::{CORRECT, Figures, Row};
+pub use options::EvalOptions;
 pub use people::Idle;
 pub use reaction::{FOUND, PATIENCE, Reaction};
 pub use reconstruction::Reconstruction;
@@ -51,52 +58,17 @@ pub use targets::Verdict;
 pub use window::{LEAD, WINDOW, Window};
 
 use crate::contents::made_with;
+use elsewhere::Elsewhere;
 use figures::Measured;
+use keep::Keep;
 use parallel::each;
+use played::Played;
 use serde::Serialize;
 use std::sync::Arc;
 use visavis::{Engine, Error, ErrorKind, Frame, Result, Sampler, SessionOptions};
 
 /// Gaze targets of the dial (SARAH table 2).
 pub const GAZE_TARGETS: [f32; 5] = [0.0, 0.25, 0.5, 0.8, 1.0];
-
-/// What is evaluated, and how thoroughly.
-#[derive(Debug, Clone)]
-pub struct EvalOptions {
-    /// Most windows, spread evenly over the clips.
-    pub windows: usize,
-    /// Threads that work on different windows.
-    pub threads: usize,
-    /// Samplers to compare; the first is the reference. Those that need a student are left out of a
-    /// bundle without one.
-    pub samplers: Vec<Sampler>,
-    /// Options of every session; seed, start, sampler and gaze are set by the evaluation.
-    pub session: SessionOptions,
-    /// Fewer and shorter runs, for a look: the gaze dial, reaction, endurance and following are
-    /// tried a few times only.
-    pub quick: bool,
-    /// Only what two bundles are compared by: the corpus' row, the samplers' with free gaze,
-    /// reconstruction. No looked-up motion, gaze dials, reaction, endurance and following.
-    pub motion_only: bool,
-    /// Window `i` has the seed `2^32 seed + i`: with another seed here the figures tell what chance
-    /// alone changes.
-    pub seed: u32,
-}
-
-impl Default for EvalOptions {
-    /// 64 windows on two threads, all samplers of the reference and the single step.
-    fn default() -> Self {
-        Self {
-            windows: 64,
-            threads: 2,
-            samplers: vec![Sampler::Midpoint4, Sampler::Midpoint2, Sampler::Midpoint1, Sampler::Single],
-            session: SessionOptions::default(),
-            quick: false,
-            motion_only: false,
-            seed: 0,
-        }
-    }
-}
 
 /// The gaze dial of a sampler (SARAH table 2).
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -124,8 +96,9 @@ pub struct Report {
     pub quick: bool,
     /// What Random and NN looked up their motion in.
     pub bank: String,
-    /// `corpus`, `Random`, `NN` (these two where they were asked for), then the samplers with free
-    /// gaze, then the gaze targets.
+    /// `corpus`, `Random`, `NN` (these two where they were asked for), `VAE` (the corpus' motion
+    /// through the autoencoder, where there is one), the samplers with free gaze, rows made
+    /// elsewhere, then the gaze targets.
     pub rows: Vec<Row>,
     /// Nobody speaks and the user stands: `real people`, `corpus` where it has such stretches, then
     /// the samplers.
@@ -162,7 +135,8 @@ pub struct EvalProgress<'a> {
 ///
 /// # Errors
 /// Those of [`Clip::read`], [`Window::choose`] and of sessions made with the options;
-/// [`ErrorKind::Argument`] for options that make no sense.
+/// [`ErrorKind::Argument`] for options that make no sense, and for rows whose files are missing or
+/// not of the windows; [`ErrorKind::Io`] for files that cannot be written.
 pub fn evaluate(
     engine: &Arc<Engine>,
     clips: &[Clip],
@@ -172,27 +146,49 @@ pub fn evaluate(
 ) -> Result<Report> {
     let windows = Window::choose(clips, options.windows)?;
     let tell = |stage: &str| progress(EvalProgress { stage, done: 0, total: 0 });
-    let judge = Judge { engine, windows: &windows, options, progress };
+    let rig = &engine.config().rig;
+    let (samplers, encodes) = (samplers_of(engine, options)?, engine.needs_sarah().is_ok());
+    let mut taken: Vec<_> = samplers.iter().map(|&sampler| made_with(engine, sampler)).collect();
+    let mut elsewhere = Vec::new();
+    for row in &options.rows {
+        elsewhere.push(Elsewhere::open(row, &taken, &windows, clips, rig)?);
+        taken.push(row.0.clone());
+    }
+    let keep = options.keep.as_ref().map(|dir| Keep::new(dir, clips, &engine.config().name)).transpose()?;
+    let judge = Judge { engine, windows: &windows, options, keep, progress };
 
-    let truth = judge.measure("corpus", &|_, window| Ok(Some(window.truth.frames.clone())))?.unwrap_or_default();
+    let recorded = |frames: Vec<Frame>| Played::recorded(rig, frames);
+    let truth = |_: usize, window: &Window| Ok(Some(recorded(window.truth.frames.clone())));
+    let truth = judge.measure("corpus", true, &truth)?.unwrap_or_default();
     let mut rows = vec![Row::new("corpus".into(), None, &truth, &truth)];
     let mut searched = "nothing".to_owned();
     if !options.motion_only {
         tell("bank");
         let own = bank.is_none();
         let bank = Bank::new(bank.unwrap_or(clips).to_vec(), own)?;
-        let random = |i: usize, window: &Window| bank.random(window, i as u64);
-        let nearest = |_: usize, window: &Window| bank.nearest(window);
+        let random = |i: usize, window: &Window| Ok(bank.random(window, i as u64)?.map(recorded));
+        let nearest = |_: usize, window: &Window| Ok(bank.nearest(window)?.map(recorded));
         for (name, source) in [("Random", &random as Source<'_>), ("NN", &nearest)] {
-            if let Some(motion) = judge.measure(name, source)? {
+            if let Some(motion) = judge.measure(name, true, source)? {
                 rows.push(Row::new(name.into(), None, &motion, &truth));
             }
         }
         searched = format!("{} stretches of {}", bank.len(), if own { "the other clips" } else { "the bank" });
     }
-    let samplers = judge.samplers()?;
+    if encodes {
+        let through = |_: usize, window: &Window| {
+            let mut frames = engine.round_trip_shown(&window.segment.frames)?;
+            Ok(Some(Played::shown(rig, frames.split_off(LEAD))))
+        };
+        let motion = judge.measure("VAE", true, &through)?.unwrap_or_default();
+        rows.push(Row::new("VAE".into(), None, &motion, &truth));
+    }
     for &sampler in &samplers {
         rows.push(judge.row(sampler, None, &truth)?);
+    }
+    for row in &elsewhere {
+        let motion = judge.measure(&row.name, true, &|i, _| Ok(Some(Played::fitted(rig, row.motion(i)?)?)))?;
+        rows.push(Row::new(row.name.clone(), None, &motion.unwrap_or_default(), &truth));
     }
     let mut dials = Vec::new();
     for (i, &sampler) in samplers.iter().enumerate() {
@@ -208,7 +204,7 @@ pub fn evaluate(
     tell("at rest");
     let real = people::Real::read()?;
     let mut idle = vec![Idle { name: "real people".into(), figures: real.idle }];
-    idle.extend(Idle::of_clips(&engine.config().rig, clips)?);
+    idle.extend(Idle::of_clips(rig, clips)?);
     for &sampler in &samplers {
         let seed = u64::from(options.seed) << 32;
         let session = SessionOptions { sampler, gaze: None, seed, ..options.session.clone() };
@@ -218,7 +214,6 @@ pub fn evaluate(
     let session = SessionOptions { sampler: samplers[0], gaze: None, ..options.session.clone() };
     let (threads, quick) = (options.threads, options.quick);
     tell("reconstruction");
-    let encodes = engine.needs_sarah().is_ok();
     let reconstruction = encodes.then(|| Reconstruction::measure(engine, &windows, threads)).transpose()?;
     let (mut reaction, mut follow, mut endurance) = (None, None, None);
     if !options.motion_only {
@@ -250,54 +245,66 @@ pub fn evaluate(
 }
 
 /// Motion in a window, given its number; `None` where there is none.
-type Source<'a> = &'a (dyn Fn(usize, &Window) -> Result<Option<Vec<Frame>>> + Sync);
+type Source<'a> = &'a (dyn Fn(usize, &Window) -> Result<Option<Played>> + Sync);
 
 /// Measures motions in the same windows.
 struct Judge<'a> {
     engine: &'a Arc<Engine>,
     windows: &'a [Window],
     options: &'a EvalOptions,
+    keep: Option<Keep<'a>>,
     progress: &'a (dyn Fn(EvalProgress<'_>) + Sync),
 }
 
 impl Judge<'_> {
-    /// Every window's motion measured; `None` if any window has none.
-    fn measure(&self, stage: &str, source: Source<'_>) -> Result<Option<Vec<Measured>>> {
+    /// Every window's motion in a row measured and, where rows are kept, `kept`; `None` if any
+    /// window has none.
+    fn measure(&self, row: &str, kept: bool, source: Source<'_>) -> Result<Option<Vec<Measured>>> {
         let rig = &self.engine.config().rig;
         let total = self.windows.len();
-        let done = |done| (self.progress)(EvalProgress { stage, done, total });
+        let done = |done| (self.progress)(EvalProgress { stage: row, done, total });
+        let keep = self.keep.as_ref().filter(|_| kept);
         let measured = each(self.options.threads, total, &done, &|i| {
             let window = &self.windows[i];
-            source(i, window)?.map(|frames| Measured::of(rig, window, frames)).transpose()
+            let Some(motion) = source(i, window)? else { return Ok(None) };
+            if let Some(keep) = keep {
+                keep.write(row, i, window, &motion.frames, row == "corpus")?;
+            }
+            Measured::of(rig, window, motion).map(Some)
         })?;
-        Ok(measured.into_iter().collect())
+        let measured: Option<Vec<_>> = measured.into_iter().collect();
+        if let (None, Some(keep)) = (&measured, keep) {
+            keep.forget(row)?;
+        }
+        Ok(measured)
     }
 
     /// The row of a sampler at a gaze target.
     fn row(&self, sampler: Sampler, gaze: Option<f32>, truth: &[Measured]) -> Result<Row> {
         let made = made_with(self.engine, sampler);
         let name = gaze.map_or_else(|| made.clone(), |g| format!("{made}, gaze {g}"));
-        let motion = self.measure(&name, &|i, window| {
+        let motion = self.measure(&name, gaze.is_none(), &|i, window| {
             let seed = u64::from(self.options.seed) << 32 | i as u64;
             let options = SessionOptions { sampler, gaze, seed, ..self.options.session.clone() };
-            motion::in_window(self.engine, &options, window).map(Some)
+            let frames = motion::in_window(self.engine, &options, window)?;
+            Ok(Some(Played::shown(&self.engine.config().rig, frames)))
         })?;
-        Ok(Row::new(name, gaze, &motion.unwrap_or_default(), truth))
+        Ok(Row::new(name, gaze, &motion.unwrap_or_default(), truth).by_model())
     }
+}
 
-    /// The samplers that the bundle has.
-    fn samplers(&self) -> Result<Vec<Sampler>> {
-        let has = |s: &Sampler| *s != Sampler::Single || self.engine.config().student.is_some();
-        let mut samplers: Vec<_> = self.options.samplers.iter().copied().filter(has).collect();
-        if self.engine.needs_sarah().is_err() {
-            // Without samplers all rows would be the same.
-            samplers.truncate(1);
-        }
-        if samplers.is_empty() {
-            return Err(Error::new(ErrorKind::Argument, "no sampler to evaluate that this bundle has"));
-        }
-        Ok(samplers)
+/// The samplers to compare that the bundle has.
+fn samplers_of(engine: &Engine, options: &EvalOptions) -> Result<Vec<Sampler>> {
+    let has = |s: &Sampler| *s != Sampler::Single || engine.config().student.is_some();
+    let mut samplers: Vec<_> = options.samplers.iter().copied().filter(has).collect();
+    if engine.needs_sarah().is_err() {
+        // Without samplers all rows would be the same.
+        samplers.truncate(1);
     }
+    if samplers.is_empty() {
+        return Err(Error::new(ErrorKind::Argument, "no sampler to evaluate that this bundle has"));
+    }
+    Ok(samplers)
 }
 
 impl Dial {
@@ -320,8 +327,7 @@ impl Report {
 
     /// The rows of the model with free gaze.
     pub fn models(&self) -> impl Iterator<Item = &Row> {
-        let others = ["corpus", "Random", "NN"];
-        self.rows.iter().filter(move |row| row.gaze_target.is_none() && !others.contains(&row.name.as_str()))
+        self.rows.iter().filter(|row| row.gaze_target.is_none() && row.model)
     }
 }
 

@@ -6,7 +6,7 @@ use crate::offline::UserPath;
 use glam::Vec3;
 
 /// Half a minute of two voices that take turns, and a user who goes round the agent.
-fn talk() -> Conversation {
+pub(super) fn talk() -> Conversation {
     let voice = |turn: f32, pitch: f32| -> Vec<f32> {
         let sample = |i: usize| {
             let t = i as f32 / 24_000.0;
@@ -24,7 +24,7 @@ fn talk() -> Conversation {
     Conversation::new(Some(voice(0.0, 800.0)), Some(voice(1.0, 1200.0)), Some(path)).unwrap()
 }
 
-fn tiny() -> Arc<Engine> {
+pub(super) fn tiny() -> Arc<Engine> {
     Engine::load(concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/goldens/tiny.safetensors")).unwrap()
 }
 
@@ -40,8 +40,8 @@ fn a_report_is_whole_and_the_same_on_any_number_of_threads() {
     let report = quick(2);
     assert_eq!(report.to_json(), quick(1).to_json());
     let names: Vec<_> = report.rows.iter().map(|row| row.name.as_str()).collect();
-    assert_eq!(names[..5], ["corpus", "Random", "NN", "midpoint1", "single"]);
-    assert_eq!(report.rows.len(), 5 + 2 * GAZE_TARGETS.len());
+    assert_eq!(names[..6], ["corpus", "Random", "NN", "VAE", "midpoint1", "single"]);
+    assert_eq!(report.rows.len(), 6 + 2 * GAZE_TARGETS.len());
     assert_eq!((report.clips, report.windows[0]), (2, 4));
 
     let truth = &report.rows[0].all;
@@ -52,11 +52,12 @@ fn a_report_is_whole_and_the_same_on_any_number_of_threads() {
     assert!(report.rows[0].wrist_ratio.unwrap() > 1.0);
     // Random weights make no conversation: far from the corpus in pose and gaze, and the report
     // says so.
-    let model = &report.rows[3].all;
+    let model = &report.rows[4].all;
     assert!(model.fgd.unwrap() > 10.0 * report.rows[2].all.fgd.unwrap(), "{model:?}");
     let missed = |what: &str| report.verdicts.iter().find(|v| v.what.starts_with(what)).unwrap().met == Some(false);
     assert!(missed("FGD, midpoint1") && missed("VAE, joints"), "{:#?}", report.verdicts);
 
+    assert!(report.rows.iter().all(|row| row.all.seam.is_some()), "all motion has blocks");
     let json: serde_json::Value = serde_json::from_str(&report.to_json()).unwrap();
     assert_eq!(json["rows"].as_array().unwrap().len(), report.rows.len());
     for text in [report.to_text(), report.to_markdown()] {
@@ -79,16 +80,16 @@ fn motion_alone_has_the_same_figures() {
     };
     let report = run(0);
     let names: Vec<_> = report.rows.iter().map(|row| row.name.as_str()).collect();
-    assert_eq!(names, ["corpus", "midpoint1", "single"]);
+    assert_eq!(names, ["corpus", "VAE", "midpoint1", "single"]);
     assert!(report.dials.is_empty() && report.reaction.is_none() && report.follow.is_none());
     assert!(report.endurance.is_none() && !report.to_text().contains("Gaze dial"));
     let all = quick(2);
-    assert_eq!(report.rows[1..], all.rows[3..5]);
+    assert_eq!(report.rows[1..], all.rows[3..6]);
     assert_eq!(report.reconstruction, all.reconstruction);
-    let batches = &report.rows[1].all.fgd_batches;
-    assert_eq!((batches.len(), Some(batches[0])), (1, report.rows[1].all.fgd), "four windows are one batch");
+    let batches = &report.rows[2].all.fgd_batches;
+    assert_eq!((batches.len(), Some(batches[0])), (1, report.rows[2].all.fgd), "four windows are one batch");
     let other = run(1);
-    assert!(other.rows[0] == report.rows[0] && other.rows[1] != report.rows[1]);
+    assert!(other.rows[..2] == report.rows[..2] && other.rows[2] != report.rows[2]);
 }
 
 /// A bundle whose poses no body could take is called defective, whether the guard trips again and
@@ -129,7 +130,7 @@ fn spoilt_motion_is_told_from_the_corpus() {
         let of = |window: &Window| {
             let mut frames = window.truth.frames.clone();
             frames.iter_mut().enumerate().for_each(|(i, f)| spoil(i, f));
-            Measured::of(rig, window, frames).unwrap()
+            Measured::of(rig, window, Played::recorded(rig, frames)).unwrap()
         };
         windows.iter().map(of).collect::<Vec<_>>()
     };

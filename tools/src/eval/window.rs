@@ -15,6 +15,8 @@ pub const LEAD: usize = 60;
 pub struct Window {
     /// Which of the clips it is from.
     pub clip: usize,
+    /// The first measured frame in that clip.
+    pub first: usize,
     /// Lead and window together.
     pub segment: Segment,
     /// The measured frames alone: the corpus' own motion.
@@ -58,6 +60,6 @@ impl Window {
         let segment = clip.read(from, LEAD + WINDOW)?;
         let truth = segment.cut(LEAD, LEAD + WINDOW);
         let speaking = truth.agent().is_some_and(|voice| is_speaking(&voice, WINDOW));
-        Ok(Self { clip: index, segment, truth, speaking })
+        Ok(Self { clip: index, first: from + LEAD, segment, truth, speaking })
     }
 }

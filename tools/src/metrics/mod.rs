@@ -3,7 +3,8 @@
 //!
 //! Every function is pure and reads frames (or a whole [`Recording`](crate::recording::Recording)).
 //! Positions are the *decoded* joint positions ([`Frame::global`](visavis::Frame::global)), not the
-//! fixed-bone-length rig's, so that nothing is prettified. Units are metres, seconds and radians. A
+//! fixed-bone-length rig's, so that nothing is prettified ([`crate::eval`] makes them the rig's
+//! first: there motion is compared with others', as it is played). Units are metres, seconds and radians. A
 //! metric that has nothing to measure (too few frames, a joint the rig lacks, no voice, no user) is
 //! `None`, never a synthetic zero.
 //!

@@ -114,13 +114,11 @@ fn parse(file: &Path) -> Result<Value> {
     if value["rows"].is_array() { Ok(value) } else { Err(bad("it has no rows".to_owned())) }
 }
 
-/// Rows of motion that the model made with free gaze; the corpus and what was looked up in it are
-/// the same for all bundles.
+/// Rows of motion that the model made with free gaze; the others are the same for all bundles, or
+/// not of them.
 fn generated(evaluation: &Value) -> impl Iterator<Item = &Value> {
-    evaluation["rows"].as_array().into_iter().flatten().filter(|row| {
-        let name = row["name"].as_str().unwrap_or_default();
-        row["gaze_target"].is_null() && !["corpus", "Random", "NN"].contains(&name)
-    })
+    let rows = evaluation["rows"].as_array().into_iter().flatten();
+    rows.filter(|row| row["gaze_target"].is_null() && row["model"] == true)
 }
 
 /// All numbers inside `value`, named by the way to them.
@@ -140,10 +138,10 @@ mod tests {
     fn evaluation(fgd: f64) -> Value {
         let batches = [0.8 * fgd, 1.2 * fgd];
         json!({"rows": [
-            {"name": "corpus", "gaze_target": null, "all": {"fgd": 0.0}},
-            {"name": "midpoint4", "gaze_target": null, "all": {"fgd": fgd, "fgd_batches": batches, "seam": 1.1}, "wrist_ratio": null},
-            {"name": "midpoint4, gaze 0.5", "gaze_target": 0.5, "all": {"fgd": 9.0}},
-            {"name": "single", "gaze_target": null, "all": {"fgd": 2.0 - fgd}},
+            {"name": "corpus", "gaze_target": null, "model": false, "all": {"fgd": 0.0}},
+            {"name": "midpoint4", "gaze_target": null, "model": true, "all": {"fgd": fgd, "fgd_batches": batches, "seam": 1.1}, "wrist_ratio": null},
+            {"name": "midpoint4, gaze 0.5", "gaze_target": 0.5, "model": true, "all": {"fgd": 9.0}},
+            {"name": "single", "gaze_target": null, "model": true, "all": {"fgd": 2.0 - fgd}},
         ], "reconstruction": {"mm": 12.5}})
     }
 
