@@ -26,8 +26,8 @@ pub struct EvalOptions {
     /// alone changes.
     pub seed: u32,
     /// Rows of motion made elsewhere: name and folder, which holds a clip of [`super::WINDOW`] frames for
-    /// each window, `000.safetensors` and on, in the space of the window's clip. Joints go through
-    /// the runtime's fit.
+    /// each window, `000.safetensors` and on, in the space of the window's clip. Joints that do
+    /// not stand on the rig go through the runtime's fit.
     pub rows: Vec<(String, PathBuf)>,
     /// A new or empty folder for the motion of each row but those with gaze targets, such files.
     pub keep: Option<PathBuf>,
