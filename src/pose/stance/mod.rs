@@ -10,8 +10,8 @@
 //! | `ik` | the leg that puts an ankle where it should be |
 //!
 //! A foot is planted as far as its lowest point, heel or toes, is near the floor and slow; both
-//! fade, so that nothing jumps when a foot lands or lifts. Heel and toes come down to the floor, each as
-//! far as it is near and the foot slow; feet below the floor are lifted onto it.
+//! fade, so that nothing jumps when a foot lands or lifts. A planted foot comes down to the floor, flat if
+//! it nearly is; feet below the floor are lifted onto it.
 
 mod ik;
 mod legs;
@@ -24,6 +24,9 @@ use glam::{Vec2, Vec3};
 /// A foot this far above its height at rest is fully planted; above the second number it is not,
 /// metres.
 const HEIGHT: [f32; 2] = [0.015, 0.05];
+/// A planted foot whose heel is this much higher or lower than its toes is put flat; from the second
+/// number on it is left as it is, metres.
+const TIPPED: [f32; 2] = [0.005, 0.02];
 /// A foot this slow is fully planted; faster than the second number it swings, m/s.
 const SPEED: [f32; 2] = [0.25, 0.8];
 
@@ -121,10 +124,16 @@ impl Contact {
         fade(self.clearance[self.low], HEIGHT) * slow(slide)
     }
 
-    /// How far heel and toes go down, metres, where the lowest point moved by `slide`: to the floor,
-    /// as far as each is near it; negative below it.
+    /// How far heel and toes go down, metres, where the lowest point moved by `slide`: the foot to the
+    /// floor, or up to it from below, then the point that is higher, as far as the foot is nearly flat.
     fn down(&self, slide: Vec2) -> [f32; 2] {
-        self.clearance.map(|c| if c > 0.0 { fade(c, HEIGHT) * slow(slide) * c } else { c })
+        let (low, high) = (self.clearance[self.low], self.clearance[1 - self.low]);
+        let planted = self.planted(slide);
+        let foot = if low > 0.0 { planted * low } else { low };
+        let tipped = high - low;
+        let mut down = [foot + planted * fade(tipped, TIPPED) * tipped; 2];
+        down[self.low] = foot;
+        down
     }
 }
 

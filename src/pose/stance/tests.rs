@@ -189,7 +189,7 @@ fn a_tipped_foot_is_put_flat_and_one_on_its_toes_is_not() {
     let feet = [Vec3::new(0.1, 0.0, 0.0), Vec3::new(-0.1, 0.0, 0.0)];
     let heights = |joints: &[Transform]| [ankle, toes].map(|j| joints[j].position.y);
     let rest = heights(&standing(&rig, feet));
-    for (tip, put) in [(0.01, true), (-0.01, true), (-0.06, false)] {
+    for (tip, put) in [(0.004, true), (-0.004, true), (-0.03, false), (0.03, false)] {
         let mut stance = Stance::new(&rig);
         let mut off = [0.0; 2];
         for _ in 0..3 {
