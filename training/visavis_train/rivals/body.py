@@ -19,7 +19,7 @@ def swung(rotation, bone, to):
 def bent(middle, end, lengths):
     """Where the middle joint of a limb comes to lie so that its end is reached: decoded places [T, 3] from the first joint on, bent towards the decoded middle."""
     a, b = lengths
-    far = np.clip(np.linalg.norm(end, axis=-1, keepdims=True), abs(a - b) + 1e-6, a + b - 1e-6)
+    far = np.clip(np.linalg.norm(end, axis=-1, keepdims=True), abs(a - b) + 1e-9, a + b - 1e-9)
     along = rig.unit(end)
     side = rig.unit(middle - np.sum(middle * along, -1, keepdims=True) * along)
     cosine = np.clip((a * a + far * far - b * b) / (2 * a * far), -1, 1)

@@ -96,7 +96,7 @@ def main():
         x, roots = make(batch, 1000003 * args.seed + k)
         spent += time.monotonic() - began
         for i, window in enumerate(some):
-            place.write(args.out, window, *body.motion(form, x[i], roots[i]), starts[i])
+            place.write(args.out, args.row, window, *body.motion(form, x[i], roots[i]), starts[i])
     print(f"{args.row}: {len(every)} windows, {len(every) * 4 * SPAN / spent:.0f} frames/s with {args.threads} threads, {args.batch} windows at a time")
 
 

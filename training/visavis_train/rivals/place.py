@@ -27,10 +27,10 @@ def windows(folder, clips):
             continue
         with safe_open(os.path.join(kept, name), framework="numpy") as f:
             meta = f.metadata() or {}
-        if not {"clip", "from"} <= meta.keys():
+        if not {"clip", "first_frame"} <= meta.keys():
             raise SystemExit(f"{kept}/{name} does not say which frames of which clip it is of; keep windows with `visavis eval --keep`")
         path = os.path.join(clips, os.path.basename(meta["clip"]))
-        out.append(Window(name, path if path.endswith(".safetensors") else path + ".safetensors", int(meta["from"]) - LEAD, meta))
+        out.append(Window(name, path if path.endswith(".safetensors") else path + ".safetensors", int(meta["first_frame"]) - LEAD, meta))
     if not out:
         raise SystemExit(f"no windows under {kept}: keep them with `visavis eval --keep {folder}`")
     return out
@@ -50,11 +50,11 @@ def cut(window):
     return made, (float(start[0]), float(start[2]), float(rig.yaw_of(r[0, 0])))
 
 
-def write(folder, window, positions, rotations, start):
+def write(folder, row, window, positions, rotations, start):
     """What was made in a window, without what led in, where the clip is: world positions [T, J, 3] and rotations [T, J, 3, 3] as seen from `start`."""
     os.makedirs(folder, exist_ok=True)
     turn, clip = rig.axis_mat("y", start[2]), store.load(window.path, voices=False)
     p = positions[LEAD:] @ turn.T + [start[0], 0, start[1]]
     q = rig.continuous_quats(rig.mat_to_quat(turn @ rotations[LEAD:]))
     user = clip.user_head[window.start + LEAD:window.start + LEAD + len(p)]
-    store.rewrite(os.path.join(folder, window.name), store.Clip(p.astype(np.float32), q.astype(np.float32), user, meta=window.meta))
+    store.rewrite(os.path.join(folder, window.name), store.Clip(p.astype(np.float32), q.astype(np.float32), user, meta=window.meta | {"row": row}))

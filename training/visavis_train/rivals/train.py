@@ -1,6 +1,6 @@
 """Trains a row: what it works on, then the model; the rows are in `rows.py`.
 
-    python -m visavis_train.rivals.train --row NAME --corpus DIR --cache runs/cache --out runs/rivals/NAME.pt --steps 1500 [--vae-steps 1000] [--workers 2]
+    python -m visavis_train.rivals.train --row NAME --corpus DIR --cache runs/cache --out runs/rivals/NAME.pt --steps 1500 [--vae-steps 900] [--workers 2]
 
 --cache is one of `train.cache` of that corpus, made with any VAE: roots, users and voices' features are taken from it. Rows with a VAE leave it and a cache
 of its latents beside --out. --resume goes on with whatever of these is there. Further arguments after `--` go to the row's last trainer (`train.flow`).
@@ -50,8 +50,8 @@ def arguments():
     parser.add_argument("--out", required=True)
     parser.add_argument("--size", choices=SIZES, default="base")
     parser.add_argument("--vae", help="take this VAE instead of training one of --vae-steps")
-    parser.add_argument("--vae-steps", type=int, default=1000)
-    parser.add_argument("--vae-batch", type=int, default=16)
+    parser.add_argument("--vae-steps", type=int, default=900)
+    parser.add_argument("--vae-batch", type=int, default=8)
     parser.add_argument("--blocks", type=int, help="of a training window [64; offline rows 115, all that they make at once]")
     parser.add_argument("--count", type=int, default=COUNT, help=f"directions of a block, where there is no VAE [{COUNT}]")
     parser.add_argument("--poses", type=int, default=1024, help="windows that a2p's codes are fitted to [1024]")
