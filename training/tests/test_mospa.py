@@ -145,7 +145,7 @@ def test_sampling_with_a_perfect_net_gives_its_answer(steps):
     def net(x, t, *_):
         asked.append(t[0].item())
         return answer
-    assert torch.equal(diffusion.sample(net, torch.randn(2, 6, 3), None, None, None, steps), answer)
+    assert torch.equal(diffusion.sample(net, torch.randn(2, 6, 3), steps, None, None, None), answer)
     assert asked == diffusion.times(steps)[::-1]
 
 

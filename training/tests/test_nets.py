@@ -104,7 +104,7 @@ def test_vae_shapes_causality_and_window():
 def test_decoder_stream_equals_one_pass():
     net = make_tiny.lively(Vae(75, 8, 2, 16, 2, 2, 3)).decoder
     z = torch.randn(2, 9, 8)
-    stream = DecoderStream(net, 2)
+    stream = DecoderStream(net)
     parts = [stream.step(z[:, k:k + 1]) for k in range(9)]
     assert torch.allclose(torch.cat(parts, 1), net(z), atol=1e-5)
 

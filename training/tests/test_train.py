@@ -10,6 +10,7 @@ from visavis_train.motion import features, rig
 from visavis_train.nets.audio import AudioEncoder
 from visavis_train.nets.flow import GAZE, Condition, FlowNet, sound_width
 from visavis_train.nets.stream import Reference, branches
+from visavis_train.nets.vae import Vae
 from visavis_train.train import audio, cache, common, data, flow, geometry, grow, student, vae, windows
 
 
@@ -108,7 +109,7 @@ def test_vae_losses_vanish_for_a_perfect_reconstruction_and_see_the_root():
 def test_principal_start_reconstructs_better_than_chance():
     x = make_tiny.sway(400)
     mean, std = x.mean(0), torch.full((x.shape[-1],), 0.05)
-    s, net = (x - mean) / std, vae.Vae(x.shape[-1], 4, 1, 32, 4, 2, 4)
+    s, net = (x - mean) / std, Vae(x.shape[-1], 4, 1, 32, 4, 2, 4)
     vae.start_from_principal(net, s, vae.channel_weights(x.shape[-1]))
     code = net.encoder.frame(s)
     assert code.shape == (400, 32) and code.std() > 0.1
@@ -244,7 +245,7 @@ def test_still_blocks_are_found(tmp_path):
 
 
 def test_a_rough_latent_space_costs_nothing_unless_asked_for():
-    net, x = make_tiny.lively(vae.Vae(75, 8, 1, 16, 2, 2, 3)), torch.randn(2, 16, 75)
+    net, x = make_tiny.lively(Vae(75, 8, 1, 16, 2, 2, 3)), torch.randn(2, 16, 75)
     torch.manual_seed(1)
     plain = net(x)[0]
     torch.manual_seed(1)

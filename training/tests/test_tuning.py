@@ -10,6 +10,7 @@ from safetensors.torch import load_file
 from visavis_train import bundle, checkpoints, export, make_tiny
 from visavis_train.motion import rig
 from visavis_train.nets.flow import Condition, FlowNet
+from visavis_train.nets.vae import Vae
 from visavis_train.train import cache, decoder, student, vae
 
 
@@ -94,7 +95,7 @@ def test_maps_from_flow_time_are_f16_even_in_an_f32_bundle(tmp_path):
 
 
 def test_chunks_encoded_together_equal_the_clip_encoded_at_once():
-    net = make_tiny.lively(vae.Vae(7, latent=4, layers=2, width=16, heads=2, mlp=2, window_blocks=3)).eval()
+    net = make_tiny.lively(Vae(7, latent=4, layers=2, width=16, heads=2, mlp=2, window_blocks=3)).eval()
     blocks = cache.CHUNK * (cache.TOGETHER["cpu"] + 2) + 5  # several at a time, a last lot of fewer, a short chunk at the end
     x = torch.randn(4 * blocks, 7)
     with torch.no_grad(), torch.autocast("cpu", torch.bfloat16):

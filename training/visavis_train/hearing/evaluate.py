@@ -109,7 +109,7 @@ def roll(b, w, chosen, student=False, seed=0, hears="sounds"):
     stream = Stream(b.student if student else b.flow, n, session["guidance"], session["gaze_guidance"], True, 4, settings["tau"], session["clean_history"]["from"], student)
     eps = session["temperature"] * torch.randn_like(z)
     stream.warm(z[:, :WARM], eps[:, :WARM], cond.at(slice(WARM)))
-    decoder, placed = DecoderStream(b.vae.decoder, n), lambda z: z * b.stat("latent_std") + b.stat("latent_mean")
+    decoder, placed = DecoderStream(b.vae.decoder), lambda z: z * b.stat("latent_std") + b.stat("latent_mean")
     root = w.roots[frames[:, 3]]
     out, roots = [], []
     for k in range(BLOCKS):

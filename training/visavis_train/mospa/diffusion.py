@@ -25,11 +25,11 @@ def times(steps):
 
 
 @torch.no_grad()
-def sample(net, noise, heard, row, genre, steps):
-    """Standardised motion [B, T, D] from noise of that shape."""
+def sample(net, noise, steps, *given):
+    """Standardised motion [B, T, D] from noise of that shape; `net(x, t, *given)` tells the clean motion."""
     x, every, a = noise, times(steps), kept()
     for i in range(steps - 1, -1, -1):
-        clean = net(x, torch.full((len(x),), every[i], device=x.device), heard, row, genre).float()
+        clean = net(x, torch.full((len(x),), every[i], device=x.device), *given).float()
         if i == 0:
             return clean
         now, then = a[every[i]], a[every[i - 1]]
@@ -46,5 +46,5 @@ def motions(net, split, which, steps, seed=0, batch=32, genre=None):
         if genre is not None:
             given = given[:2] + (torch.full_like(given[2], genre),)
         noise = torch.stack([torch.randn(net.frames, len(net.motion_mean), generator=torch.Generator().manual_seed(1000003 * seed + i)) for i in some])
-        out.append(net.unstandardise(sample(net, noise, *given, steps)))
+        out.append(net.unstandardise(sample(net, noise, steps, *given)))
     return torch.cat(out).numpy()

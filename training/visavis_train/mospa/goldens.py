@@ -38,12 +38,12 @@ def compute(net):
     ears = [torch.from_numpy(features.ear(y)).float()[None] for y in (left, right)]
     place, genre, noise = torch.tensor([[1.5, 0.7, -2.0]]), torch.tensor([2]), torch.randn(1, t, layout.SIZE).half().float()
     heard, row = net.hear(*ears), nets.source_row(place, torch.ones(1))
-    motion = net.unstandardise(diffusion.sample(net, noise, heard, row, genre, 4))[0]
+    motion = net.unstandardise(diffusion.sample(net, noise, 4, heard, row, genre))[0]
     p, r = layout.to_world(motion.numpy())
     return {"sound": torch.from_numpy(i16), "features": torch.from_numpy(features.ear(i16 / 32768)).float(), "left": ears[0][0], "right": ears[1][0], "location": place[0],
             "genre": genre.int(), "noise": noise[0].half(), "x0": net(noise, torch.tensor([999]), heard, row, genre)[0], "motion": motion,
             "positions": torch.from_numpy(p).float(), "rotations": torch.from_numpy(rig.mat_to_quat(r)).float(),
-            "blind": net.unstandardise(diffusion.sample(net, noise, heard, 0 * row, torch.tensor([nets.UNKNOWN]), 4))[0]}
+            "blind": net.unstandardise(diffusion.sample(net, noise, 4, heard, 0 * row, torch.tensor([nets.UNKNOWN])))[0]}
 
 
 def main():

@@ -7,6 +7,7 @@ import torch
 
 from .flow import GAZE, cat_conditions
 from .layers import Past, bias_of, rotary
+from .vae import Stack
 
 
 def branches(cond, gaze):
@@ -183,19 +184,23 @@ class Stream:
         return z
 
 
+def decoding(decoder):
+    """What turns latents [B, 1, Dz] (not standardised) into standardised frames [B, 4, F], block by block."""
+    return DecoderStream(decoder).step if isinstance(decoder, Stack) else decoder
+
+
 class DecoderStream:
     """The VAE's decoder block by block with a cache of keys and values; equals decoding everything at once."""
 
-    def __init__(self, decoder, batch):
-        self.net, self.position, self.batch = decoder, 0, batch
+    def __init__(self, decoder):
+        self.net, self.position = decoder, 0
         self.pasts = [Past() for _ in decoder.layers]
 
     @torch.no_grad()
     def step(self, z):
         """Latents [B, 1, Dz] (not standardised) -> standardised frames [B, 4, F]."""
         net, t, device = self.net, self.net.tokens, z.device
-        first = net.latent(z)
-        x = torch.cat([first, net.frame_token.to(first.dtype).expand(self.batch, -1, -1)], 1) + net.slot
+        x = net.enter(z)[:, 0] + net.slot
         cos, sin = rotary(torch.arange(self.position * t, (self.position + 1) * t, device=device), net.head_dim)
         seen = torch.ones(t, len(self.pasts[0]) + t, dtype=torch.bool, device=device)
         place = cos, sin, bias_of(seen.tril(len(self.pasts[0])))
@@ -203,4 +208,4 @@ class DecoderStream:
             x = layer(x, place, past=past)
             past.keep((net.window - 1) * t)
         self.position += 1
-        return net.out(net.ln_f(x)[:, 1:].float())
+        return net.leave(net.ln_f(x))

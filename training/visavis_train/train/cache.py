@@ -15,10 +15,11 @@ from ..corpus import measures, store
 from ..hearing import appraise, ears
 from ..motion import rig
 from ..nets.audio import AudioEncoder
-from ..nets.vae import Vae
+from ..nets.vae import codec
 from . import common
 from .common import mixed
-from .data import Split, expand
+from .data import Split
+from .forms import FORMS
 from .geometry import to_world
 from .team import Team
 
@@ -30,7 +31,7 @@ TOGETHER = {"cpu": 8, "cuda": 64}
 def load_vae(path, device="cpu"):
     """Averaged network, mean and deviation of features, and the checkpoint."""
     state = common.load(path)
-    net = Vae(len(state["mean"]), **state["size"])
+    net = codec(len(state["mean"]), state["size"])
     net.load_state_dict(state["ema"])
     return net.eval().to(device), state["mean"].to(device), state["std"].to(device), state
 
@@ -129,11 +130,16 @@ def join(caches, split):
     return joined | {k: parts[0][k] for k in ("latent_mean", "latent_std")} | ({"silence": hearing["silence"]} if hearing else {})
 
 
-def latents(clips, vae, mean, std, which):
+def form_of(state):
+    """What a frame is to the VAE of a checkpoint."""
+    return FORMS[state.get("form", "icosahedra")]
+
+
+def latents(clips, vae, mean, std, form, which):
     """{clip: [latents of each phase]} of clips `which`."""
     out = {}
     for i in which:
-        x = (expand(clips.frames[clips.starts[i]:clips.starts[i + 1]].to(mean.device)) - mean) / std
+        x = (form.of(clips.frames[clips.starts[i]:clips.starts[i + 1]].to(mean.device)) - mean) / std
         out[i] = [encode(vae, x[p:p + (len(x) - p) // 4 * 4]).cpu() for p in PHASES]
     return out
 
@@ -212,8 +218,8 @@ def main():
                     raise SystemExit(f"{source} is not of this corpus' {split} clips")
                 state |= {k: before[k] for k in names}
         if not args.latents_of:
-            vae, mean, std, _ = load_vae(args.vae, device)
-            parts = team.gather(latents(clips, vae, mean, std, mine), os.path.join(args.out, f"{split}.part"))
+            vae, mean, std, kept = load_vae(args.vae, device)
+            parts = team.gather(latents(clips, vae, mean, std, form_of(kept), mine), os.path.join(args.out, f"{split}.part"))
             if team.leads:
                 state |= joined(clips, parts, stats)
                 stats = state["latent_mean"], state["latent_std"]

@@ -17,7 +17,8 @@ from safetensors import safe_open
 
 from ..corpus import store
 from ..motion import rig
-from ..motion.features import ICO, RADIUS, root_of
+from ..motion.features import root_of
+from .forms import ICOSAHEDRA, expand
 
 COMPACT = 3 + 12 * rig.J
 ARRAYS = {"frames": ((COMPACT,), np.float32), "roots": ((3,), np.float64), "user": ((3,), np.float32), "gaze": ((), np.float32)}
@@ -40,18 +41,9 @@ def compact(positions, quats):
     return flat, np.stack([root[:, 0], root[:, 1], np.unwrap(yaw)], -1)
 
 
-def expand(c):
-    """Compact frames [..., 3 + 12 J] -> feature vectors [..., 3 + 36 J], metres."""
-    joints = (c.shape[-1] - 3) // 12
-    p = c[..., 3:3 + 3 * joints].unflatten(-1, (joints, 1, 3))
-    r = c[..., 3 + 3 * joints:].unflatten(-1, (joints, 3, 3))
-    verts = p + RADIUS * torch.einsum("...jab,vb->...jva", r, torch.as_tensor(ICO, dtype=c.dtype, device=c.device))
-    return torch.cat([c[..., :3], verts.flatten(-3)], -1)
-
-
 def load_motion(path, voices=True):
-    """One clip: its store.Clip, compact frames, roots [T, 3] and gaze score [T]."""
-    clip = store.load(path, voices)
+    """One clip (a path, or what was read from it): its store.Clip, compact frames, roots [T, 3] and gaze score [T]."""
+    clip = path if isinstance(path, store.Clip) else store.load(path, voices)
     frames, roots = compact(clip.positions, clip.rotations)
     g = rig.gaze_score(clip.positions.astype(np.float64), rig.quat_to_mat(clip.rotations), clip.user_head)
     return clip, torch.from_numpy(frames), torch.from_numpy(roots), torch.from_numpy(g.astype(np.float32))
@@ -144,11 +136,12 @@ class Split:
 
 
 class Motions:
-    """Windows of a split's poses. `captured`: how much more often captured takes are drawn than their length says; `limit`: the first clips only."""
+    """Windows of a split's poses. `captured`: how much more often captured takes are drawn than their length says; `limit`: the first clips only; `form`: of
+    what is drawn."""
 
-    def __init__(self, folder, split, limit=None, captured=1.0, device="cpu", workers=1):
+    def __init__(self, folder, split, limit=None, captured=1.0, device="cpu", workers=1, form=ICOSAHEDRA):
         clips = Split(folder, split, workers=workers)
-        self.size, self.device = min(len(clips), limit or len(clips)), torch.device(device)
+        self.size, self.device, self.form = min(len(clips), limit or len(clips)), torch.device(device), form
         self.starts, self.lengths = clips.starts[:self.size], clips.starts.diff()[:self.size]
         self.weights = self.lengths * torch.where(clips.talk[:self.size], 1.0, captured)
         self.frames = clips.frames.to(self.device) if self.size else None
@@ -159,7 +152,7 @@ class Motions:
         clip = torch.multinomial(self.weights * long, batch, replacement=True)
         at = (torch.rand(batch, dtype=torch.float64) * (self.lengths[clip] - frames + 1)).long()
         index = (self.starts[clip] + at)[:, None] + torch.arange(frames)
-        return expand(self.frames[index.to(self.device)])
+        return self.form.of(self.frames[index.to(self.device)])
 
 
 class Several:
@@ -175,13 +168,14 @@ class Several:
 
 
 def statistics(motions, stride=9, most=250000):
-    """Mean and deviation per channel, and the frames they are of; a joint's 36 channels share one deviation, at least 0.02 m. The first frame of
+    """Mean and deviation per channel, and the frames they are of; a joint's channels share one deviation, at least 0.02 (m). The first frame of
     a clip, whose root has no displacement, is left out."""
     index = torch.cat([torch.arange(int(a) + 1, int(a + n), stride) for a, n in zip(motions.starts, motions.lengths)])
-    x = expand(motions.frames[index[:: 1 + len(index) // most].to(motions.device)])
-    mean, std = x.mean(0), x.std(0)
-    joints = x[:, 3:].unflatten(-1, (-1, 36)).var(0).mean(-1).sqrt().clamp(min=0.02)
-    std = torch.cat([std[:3].clamp(min=1e-3), joints.repeat_interleave(36)])
+    form = motions.form
+    x = form.of(motions.frames[index[:: 1 + len(index) // most].to(motions.device)])
+    mean, std, end = x.mean(0), x.std(0), x.shape[1] - form.tail
+    joints = x[:, 3:end].unflatten(-1, (-1, form.size)).var(0).mean(-1).sqrt().clamp(min=0.02)
+    std = torch.cat([std[:3].clamp(min=1e-3), joints.repeat_interleave(form.size), std[end:].clamp(min=0.02)])
     return mean, std, x
 
 

@@ -15,9 +15,10 @@ import torch
 
 from ..nets.flow import FlowNet
 from . import common
-from .cache import load_audio, load_vae
+from .cache import form_of, load_audio, load_vae
 from .common import mixed
-from .geometry import ROOT, integrate, local_positions, to_world
+from .forms import ICOSAHEDRA
+from .geometry import ROOT, integrate, to_world
 from .loop import Loop
 from .sizes import SIZES
 from .team import Team
@@ -26,19 +27,19 @@ from .windows import Windows, voices_of
 
 
 @torch.no_grad()
-def latent_metric(vae, mean, std, z, latent_mean, latent_std, root=30.0):
+def latent_metric(vae, mean, std, z, latent_mean, latent_std, root=30.0, form=ICOSAHEDRA):
     """How much each direction of a (standardised) latent moves the body: [Dz, Dz], trace Dz.
 
     Finite differences through the decoder: response of the block's own frames, weighted as in the VAE's loss, and of the world
     positions after it. A latent's plain squared error would lose the root among the other directions."""
-    w = channel_weights(len(mean)).to(z.device) / 10
+    w = channel_weights(len(mean), form=form).to(z.device) / 10
     total = 0
     for row in z:
         base = vae.decoder((row * latent_std + latent_mean)[None])[:, -4:]
         moved = row.repeat(row.shape[-1], 1, 1)
         moved[:, -1] += 0.1 * torch.eye(row.shape[-1], device=z.device)
         y = vae.decoder(moved * latent_std + latent_mean)[:, -4:]
-        place = lambda f: to_world(integrate((f * std + mean)[..., :ROOT]), local_positions(f * std + mean)).flatten(1) * root
+        place = lambda f: to_world(integrate((f * std + mean)[..., :ROOT]), form.points(f * std + mean)).flatten(1) * root
         d = torch.cat([((y - base) * w.sqrt()).flatten(1) / (4 * len(mean)) ** 0.5, (place(y) - place(base)) / (4 * 22) ** 0.5], 1)
         total = total + d @ d.T
     return total * (len(total) / total.trace())
@@ -171,11 +172,12 @@ def main():
     audio = load_audio(args.end_to_end, device).train() if args.end_to_end else None
     hearing = {"audio": audio, "voices": team.first(lambda: voices_of(args.corpus, "train", device)), "live": args.live} if audio else {}
     train = Windows(os.path.join(args.cache, "train.pt"), args.blocks, device=device, sounds=args.sounds, **hearing)
-    vae, mean, std, _ = load_vae(args.vae, device)
+    vae, mean, std, kept = load_vae(args.vae, device)
     plain = Windows(os.path.join(args.cache, "train.pt"), 16, jitter=False, device=device)
-    metric = latent_metric(vae, mean, std, plain.batch(24)[0], train.mean.to(device), train.std.to(device))
+    metric = latent_metric(vae, mean, std, plain.batch(24)[0], train.mean.to(device), train.std.to(device), form=form_of(kept))
     first = common.load(args.out if args.resume else args.init) if args.resume or args.init else None
     size, latent = first["size"] if first else SIZES[args.size]["flow"], train.z.shape[1]
+    size = size | {"embed_latent": max(size["embed_latent"], latent)}  # a narrower one would hide some of the noise
     net = FlowNet(latent, train.audio_features, **size, sound_features=train.sound_features).to(device)
     if first:
         learns = [] if first.get("sound", 0) else [k for k in net.state_dict() if "_sound." in k]

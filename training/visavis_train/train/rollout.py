@@ -13,21 +13,21 @@ import torch
 from .. import bundle as bundles
 from ..motion import rig
 from ..nets.flow import Condition, absent
-from ..nets.stream import DecoderStream, Stream
+from ..nets.stream import Stream, decoding
 from .cache import features
 from .data import clips, expand, load_motion
 from .geometry import FEET, HANDS, gaze, integrate, local_positions, to_local, to_world
 
 
 class Batch:
-    """Clips of one length with everything that conditions the agent; the agent's start is the origin facing +Z."""
+    """Clips (paths or what was read from them) of one length with everything that conditions the agent; the agent's start is the origin facing +Z."""
 
-    def __init__(self, b, paths, blocks):
+    def __init__(self, audio, paths, blocks):
         self.blocks, frames = blocks, 4 * blocks
         self.user, self.agent, self.voice, self.has, self.roots, self.frames, self.speaking = [], [], [], [], [], [], []
         for path in paths:
             clip, c, roots, _ = load_motion(path)
-            f = features(b.audio, clip, len(c))
+            f = features(audio, clip, len(c))
             self.user.append(torch.from_numpy(clip.user_head[:frames].copy()).double())
             self.agent.append(f["agent"][:frames].float())
             self.voice.append(f["voice"][:frames].float())
@@ -64,9 +64,22 @@ def roll(b, batch, target=None, student=False, steps=4, seed=0, guidance=None, g
     eps = noise(m)
     stream.warm(idle, eps, absent(n, m, width))
     eps = eps[:, -1:]
-    decoder, place = DecoderStream(b.vae.decoder, n), lambda z: z * b.stat("latent_std") + b.stat("latent_mean")
+    decode, place = decoding(b.vae.decoder), lambda z: z * b.stat("latent_std") + b.stat("latent_mean")
     for i in range(m):
-        decoder.step(place(idle[:, i:i + 1]))
+        decode(place(idle[:, i:i + 1]))
+
+    def step(cond):
+        nonlocal eps
+        eps = correlation * eps + (1 - correlation ** 2) ** 0.5 * noise(1)
+        return b.unstandardise(decode(place(stream.step(heat * eps, cond))))
+
+    return walk(step, batch, target)
+
+
+def walk(step, batch, target=None):
+    """Feature vectors [B, T, F] in metres and roots [B, T, 3] of a model that goes on from block to block: `step` gives the next block's frames under a
+    Condition, in which the user is seen from where the model's own agent stands."""
+    n, width = len(batch), batch.agent.shape[-1]
     root, out, roots = torch.zeros(n, 3, dtype=torch.float64), [], []
     for k in range(batch.blocks):
         now, before = slice(4 * k, 4 * k + 4), slice(4 * k - 4, 4 * k)
@@ -76,8 +89,7 @@ def roll(b, batch, target=None, student=False, steps=4, seed=0, guidance=None, g
         flags = torch.tensor([[known, 1.0, known, 1.0]]).repeat(n, 1)
         flags[:, 1:3] *= batch.has
         cond = Condition(user, batch.agent[:, now].reshape(n, 1, -1), voice, torch.full((n, 1, 4), float(target or 0)), flags[:, None])
-        eps = correlation * eps + (1 - correlation ** 2) ** 0.5 * noise(1)
-        x = b.unstandardise(decoder.step(place(stream.step(heat * eps, cond))))
+        x = step(cond)
         path = integrate(x[..., :3].double(), root)
         root = path[:, -1]
         out.append(x)
@@ -165,7 +177,7 @@ def main():
     for path in clips(args.corpus, args.split):
         if path.split("/")[-1].startswith(args.kind) and len(paths) < args.clips and len(load_motion(path)[1]) >= 4 * args.blocks:
             paths.append(path)
-    batch = Batch(b, paths, args.blocks)
+    batch = Batch(b.audio, paths, args.blocks)
     show = lambda name, f: print(name.ljust(10), json.dumps({k: round(v, 3) for k, v in f.items()}), flush=True)
     show("truth", figures(b, batch.frames, batch.roots, batch))
     world = lambda x, roots: to_world(roots, local_positions(x).double())[0].numpy()

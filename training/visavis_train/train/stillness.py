@@ -64,7 +64,7 @@ class Judge:
         paths = [p for p in clips(folder, split) if os.path.basename(p).startswith("talk") and len(store.load(p, voices=False).positions) >= 4 * blocks][:count]
         if not paths:
             raise SystemExit(f"no conversations of {blocks * 4 / 30:.0f} s under {folder}/{split}")
-        self.b, self.batch, self.seed, self.masks = b, Batch(b, paths, blocks), seed, []
+        self.b, self.batch, self.seed, self.masks = b, Batch(b.audio, paths, blocks), seed, []
         for path in paths:
             clip = store.load(path)
             agent, user = people.phrases(clip, "agent"), people.phrases(clip, "user")

@@ -63,7 +63,7 @@ class Rollouts:
         eps, root = temperature * torch.randn_like(z), w.roots[frames[:, 4 * warm + 3]]
         stream = Stream(net, size, gaze=gaze, tau_history=tau_history, single=True)
         stream.warm(z[:, :warm], eps[:, :warm], cond.at(slice(warm)))
-        decoder, placed = DecoderStream(self.decoder, size), lambda z: z * std + mean
+        decoder, placed = DecoderStream(self.decoder), lambda z: z * std + mean
         for k in range(warm):
             decoder.step(placed(z[:, k:k + 1]))
         for k in range(warm, n):
