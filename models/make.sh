@@ -1,9 +1,11 @@
 #!/usr/bin/env bash
 # usage: models/make.sh BUNDLE [REPORT FOLDER]
 #
-# From a bundle as training exports it (f32; one of f16 will do): the f16 and int8 bundles that are shipped, their checksums, and the accuracy
+# From a bundle as training exports it (f32; one of f16 will do): bundles to be shipped, their checksums, and the accuracy
 # report of f16, int8 and int4 against BUNDLE (into docs/report unless told otherwise). Same bundle, same bytes.
 #
+#   NAME=room          of models/visavis-NAME-i8.safetensors and, of f16, models/visavis-NAME.safetensors (base)
+#   SHIP='i8'          schemes that go into models/ ('f16 i8')
 #   CLIPS=DIR          judges all four on these clips with `visavis eval`, for the change of FGD: WINDOWS (240) windows, samplers midpoint4 and single,
 #                      and BUNDLE with another seed, which shows what chance alone changes
 #   ARM64=no           leaves out the numerics of an arm64 CPU (models/arm64.sh), which are made under emulation where the arm64 kit is there
@@ -22,7 +24,8 @@ say() { echo "$(date +%T) $*" >&2; }
 
 reference=$scratch/reference.safetensors  # BUNDLE may be one of the files that are written here
 cp "$bundle" "$reference"
-f16=$scratch/visavis-base.safetensors i8=$scratch/visavis-base-i8.safetensors i4=$scratch/visavis-base-i4.safetensors
+name=visavis-${NAME:-base}
+f16=$scratch/$name.safetensors i8=$scratch/$name-i8.safetensors i4=$scratch/$name-i4.safetensors
 say 'quantising'
 if visavis inspect "$reference" | grep 'flow transformer' | grep -q f32; then
   visavis quantize "$reference" "$f16" --scheme f16
@@ -58,7 +61,7 @@ if [ -n "$clips" ]; then
 fi
 say 'accuracy report'
 visavis report --reference "$reference" --candidate "$f16" "$i8" "$i4" --minutes "${MINUTES:-10}" --out "$report" "${more[@]}"
-cp "$f16" "$i8" models/
+for scheme in ${SHIP:-f16 i8}; do cp "${!scheme}" models/; done
 (cd models && sha256sum visavis-*.safetensors >SHA256SUMS)
 ls -l models/*.safetensors
 say 'done'
