@@ -120,8 +120,10 @@ fn eval_judges_a_bundle_and_writes_reports() {
 fn eval_keeps_motion_and_judges_what_others_made() {
     let scratch = Scratch::new("files-keep");
     let kept = scratch.path("kept");
-    let eval = ["eval", "--model", TINY, "--quick", "--motion-only", "--windows", "1", "--sampler", "single"];
-    let with = |args: &[&'static str]| [&eval[..], args].concat();
+    fn with<'a>(args: &[&'a str]) -> Vec<&'a str> {
+        let eval = ["eval", "--model", TINY, "--quick", "--motion-only", "--windows", "1", "--sampler", "single"];
+        [&eval[..], args].concat()
+    }
     succeeds(&with(&["--keep", kept.to_str().unwrap()]));
     assert!(kept.join("corpus/000.safetensors").is_file() && kept.join("VAE/000.safetensors").is_file());
 
