@@ -47,6 +47,13 @@ pub(super) fn reach([hip, knee, ankle]: [Vec3; 3], target: Vec3, forward: Vec3) 
     Some(Reach { knee: new_knee, ankle: new_ankle, turns })
 }
 
+/// How low an ankle over the floor point of `target` can be put; not above where it was decoded.
+pub(super) fn lowest([hip, knee, ankle]: [Vec3; 3], target: Vec3) -> f32 {
+    let longest = ankle.distance(hip).max(REACH * (knee.distance(hip) + ankle.distance(knee)));
+    let (x, z) = (target.x - hip.x, target.z - hip.z);
+    (hip.y - (longest * longest - x * x - z * z).max(0.0).sqrt()).min(ankle.y)
+}
+
 /// The part of `v` at right angles to the unit vector `axis`, as a direction; zero where there is
 /// none.
 fn across(v: Vec3, axis: Vec3) -> Vec3 {

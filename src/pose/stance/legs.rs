@@ -1,7 +1,7 @@
 //! The leg of a planted foot: what the root cannot take up.
 
 use super::super::fit::swing;
-use super::ik::reach;
+use super::ik::{lowest, reach};
 use super::{Contact, HEIGHT, earlier, fade, floor, turn, turned};
 use crate::frame::Transform;
 use crate::pose::Rig;
@@ -9,6 +9,8 @@ use glam::{Quat, Vec2, Vec3};
 
 /// Share of its displacement that a swinging foot loses in a frame.
 const RELEASE: f32 = 0.25;
+/// A foot comes down by at most this much in a frame, metres.
+const LOWER: f32 = 0.0015;
 /// A planted foot is held up to this far from where it was decoded, metres; beyond that it slides.
 const FURTHEST: f32 = 0.08;
 /// And turned by up to this angle, radians.
@@ -23,6 +25,8 @@ pub(super) struct Leg {
     /// before, metres; about Y, radians.
     moved: Vec2,
     twisted: f32,
+    /// How much lower than decoded heel and toes are, metres.
+    lowered: [f32; 2],
     /// Heel and toes as shown, in the heading frame of the frame before.
     shown: [Vec3; 2],
 }
@@ -33,7 +37,7 @@ impl Leg {
         let joint = |name: &str| rig.index(&format!("{side}{name}"));
         let chain = [rig.index("hips")?, joint("UpperLeg")?, joint("LowerLeg")?, joint("Foot")?, joint("Toes")?];
         let whole = chain.windows(2).all(|pair| rig.joints[pair[1]].parent == Some(pair[0]));
-        let leg = Self { chain, moved: Vec2::ZERO, twisted: 0.0, shown: [Vec3::ZERO; 2] };
+        let leg = Self { chain, moved: Vec2::ZERO, twisted: 0.0, lowered: [0.0; 2], shown: [Vec3::ZERO; 2] };
         whole.then_some(leg)
     }
 
@@ -42,9 +46,11 @@ impl Leg {
         (self.moved, self.twisted) = (Vec2::ZERO, 0.0);
     }
 
-    /// The first frame: the foot is shown as decoded.
-    pub(super) fn start(&mut self, points: [Vec3; 2]) {
-        self.shown = points;
+    /// The first frame: a foot near the floor stands on it. `now` are heel and toes as decoded.
+    pub(super) fn start(&mut self, joints: &mut [Transform], contact: &Contact, now: &[Vec3; 2]) {
+        self.lowered = contact.down(Vec2::ZERO);
+        let sole = tipped(now[1] - now[0], self.lowered[0] - self.lowered[1]);
+        self.shown = self.place(joints, now[0] - self.lowered[0] * Vec3::Y, sole);
     }
 
     /// Moves the leg in `joints` so that a planted foot is shown on the floor, where it was shown in
@@ -64,7 +70,8 @@ impl Leg {
         // A foot on its toes turns about them: its direction is held as far as both are down.
         let flat = planted * fade(contact.clearance[1 - low], HEIGHT);
         let down = contact.down(slide);
-        let sole = tipped(now[1] - now[0], down[0] - down[1]);
+        self.lowered = [0, 1].map(|i| down[i].min(self.lowered[i].max(0.0) + LOWER));
+        let sole = tipped(now[1] - now[0], self.lowered[0] - self.lowered[1]);
         // Everything below is in this frame's heading frame.
         let later = |p: Vec3| turned(floor(p) - Vec2::new(step[0], step[1]), -step[2]);
         let shown = self.shown.map(later);
@@ -81,7 +88,7 @@ impl Leg {
         self.moved = (keep * self.moved).clamp_length_max(FURTHEST);
         self.twisted = ((1.0 - RELEASE * (1.0 - flat)) * self.twisted).clamp(-MOST_TURNED, MOST_TURNED);
 
-        let target = now[0] + Vec3::new(self.moved.x, -down[0], self.moved.y);
+        let target = now[0] + Vec3::new(self.moved.x, -self.lowered[0], self.moved.y);
         self.shown = self.place(joints, target, sole);
     }
 
@@ -91,7 +98,10 @@ impl Leg {
         let [hips, upper, lower, foot, toes] = self.chain;
         let at = |j: usize| joints[j].position;
         let forward = joints[hips].rotation * Vec3::Z;
-        let Some(leg) = reach([at(upper), at(lower), at(foot)], target, forward) else {
+        let chain = [at(upper), at(lower), at(foot)];
+        // A leg that is too short for the floor leaves its foot where it is, not nearer to the body.
+        let target = Vec3 { y: target.y.max(lowest(chain, target)), ..target };
+        let Some(leg) = reach(chain, target, forward) else {
             return [at(foot), at(toes)];
         };
         let twist = Quat::from_rotation_y(self.twisted);

@@ -87,15 +87,17 @@ impl Stance {
     pub(super) fn hold(&mut self, joints: &mut [Transform], step: [f32; 3]) -> [f32; 3] {
         let Some(sides) = &mut self.sides else { return step };
         let now = [0, 1].map(|s| sides[s].foot.points(joints));
+        let contacts = [0, 1].map(|s| sides[s].foot.contact(&now[s]));
         let before = [0, 1].map(|s| sides[s].before.replace(now[s]));
         let [Some(left), Some(right)] = before else {
-            for (side, points) in sides.iter_mut().zip(now) {
-                side.leg.iter_mut().for_each(|leg| leg.start(points));
+            for s in [0, 1] {
+                if let Some(leg) = &mut sides[s].leg {
+                    leg.start(joints, &contacts[s], &now[s]);
+                }
             }
             return step;
         };
         let before = [left, right];
-        let contacts = [0, 1].map(|s| sides[s].foot.contact(&now[s]));
         let step = root::correct(&contacts, &before, &now, step);
         for s in [0, 1] {
             if let Some(leg) = &mut sides[s].leg {

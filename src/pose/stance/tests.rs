@@ -168,7 +168,7 @@ fn feet_do_not_go_through_the_floor() {
 fn a_foot_that_hovers_is_put_down() {
     let rest = shown(1, |_| [Vec3::new(0.1, 0.0, 0.0), Vec3::new(-0.1, 0.0, 0.0)])[0][0].y;
     let way = shown(20, |_| [Vec3::new(0.1, 0.012, 0.0), Vec3::new(-0.1, 0.0, 0.0)]);
-    assert!(way[1..].iter().flatten().all(|ankle| (ankle.y - rest).abs() < 1e-4), "{:?}", way[19]);
+    assert!(way.iter().flatten().all(|ankle| (ankle.y - rest).abs() < 1e-4), "{:?}", way[19]);
 }
 
 #[test]
@@ -177,7 +177,7 @@ fn a_foot_that_lifts_or_lands_does_not_jump() {
     let height = |i: usize| 0.06 * (1.0 - (i as f32 * std::f32::consts::TAU / 48.0).cos());
     let way = shown(97, |i| [Vec3::new(0.1, height(i), 0.0), Vec3::new(-0.1, 0.0, 0.0)]);
     let steps = way.windows(2).map(|pair| (pair[1][0].y - pair[0][0].y).abs());
-    let most = steps.skip(1).fold(0.0, f32::max);
+    let most = steps.fold(0.0, f32::max);
     assert!(most < 0.02, "{most}");
     assert!((way[24][0].y - way[24][1].y - 0.12).abs() < 1e-3, "free in the air: {:?}", way[24]);
 }
