@@ -8,7 +8,7 @@ import torch
 from visavis_train import bundle, make_tiny
 from visavis_train.motion import features, rig
 from visavis_train.nets.audio import AudioEncoder
-from visavis_train.nets.flow import GAZE, Condition, FlowNet, sound_width
+from visavis_train.nets.flow import GAZE, USER, Condition, FlowNet, sound_width
 from visavis_train.nets.stream import Reference, branches
 from visavis_train.nets.vae import Vae
 from visavis_train.train import audio, cache, common, data, flow, geometry, grow, student, vae, windows
@@ -154,8 +154,6 @@ def test_voices_that_are_heard_in_training_give_the_features_of_the_whole_clip(t
         for heard, who, start in ((cond.agent, 0, first), (cond.voice, 1, first - 4)):
             want = whole[who, start - 160 * clip:][:64].reshape(16, -1)
             assert torch.allclose(heard[row], want, atol=0.02 * float(want.abs().max()))
-    w.has[:, 1] = 0
-    assert w.batch(8, place)[1].voice.abs().max() == 0
     w.live = 3
     some = w.batch(8, place)[1].agent
     assert torch.equal(some[:3], cond.agent[:3]) and not torch.allclose(some[3:], cond.agent[3:])
@@ -167,6 +165,24 @@ def test_dropout_clears_flags_at_about_its_rate(tmp_path):
     w = made_windows(tmp_path, drop=0.05, drop_all=0.1, drop_gaze=0.35, prefix=0.0)
     flags = torch.cat([w.batch(64)[1].flags for _ in range(8)])
     assert 0.75 < flags[..., 0].mean() < 0.95 and 0.45 < flags[..., GAZE].mean() < 0.72 and flags[..., 2].sum() == 0
+
+
+def test_a_voice_that_a_clip_lacks_is_heard_to_be_silent_in_some_windows(tmp_path):
+    w = made_windows(tmp_path, drop=0, drop_all=0, drop_gaze=0, prefix=0, quiet=0.4)
+    agent, user = (torch.cat([w.batch(64)[1].flags[..., 1:3] for _ in range(8)])).unbind(-1)
+    assert agent.all() and 0.3 < user.mean() < 0.5 and (user == user[:, :1]).all()
+
+
+def test_a_user_who_is_away_is_not_seen_all_along_or_in_part(tmp_path):
+    w = made_windows(tmp_path, drop=0, drop_all=0, drop_gaze=0, prefix=0, away=0.5)
+    seen = torch.cat([w.batch(64)[1].flags[..., USER] for _ in range(8)])
+    share = seen.mean(1)
+    whole, none = (share == 1).float().mean(), (share == 0).float().mean()
+    assert 0.4 < whole < 0.6 and 0.25 < none < 0.42
+    changes = seen.diff(dim=1).abs().sum(1)
+    assert (changes[(share > 0) & (share < 1)] == 1).all() and (seen[:, 0] > seen[:, -1]).any() and (seen[:, 0] < seen[:, -1]).any()
+    w.away = 0
+    assert w.batch(64)[1].flags[..., USER].all()
 
 
 def test_teacher_over_a_window_equals_sampling_block_by_block():

@@ -63,9 +63,8 @@ def encode(vae, x):
 
 @torch.no_grad()
 def listen(audio, voice, frames, chunk=1500):
-    """i16 samples [800 T] or None -> features [T, D_a] f16, on the CPU."""
-    if voice is None:
-        return torch.zeros(frames, audio.out.out_features, dtype=torch.float16)
+    """i16 samples [800 T], or None for silence -> features [T, D_a] f16, on the CPU."""
+    voice = np.zeros(800 * frames, np.int16) if voice is None else voice
     device = audio.out.weight.device
     wave, state = torch.from_numpy(voice).to(device).float()[None] / 32768, audio.state()
     parts = []

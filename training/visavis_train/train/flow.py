@@ -165,13 +165,15 @@ def main():
     parser.add_argument("--turn", type=float, default=0.0, help="blocks in which the body turns weigh 1 + TURN [0]")
     parser.add_argument("--fresh", type=float, default=1.0, help="factor on the learning rate of what embeds sounds [1]")
     parser.add_argument("--sounds", type=float, default=1.0, help="how much more often windows with sounds are drawn than their length says [1]")
+    parser.add_argument("--away", type=float, default=0.1, help="share of windows in which the user is not seen, beside the dropout of every modality [0.1]")
+    parser.add_argument("--quiet", type=float, default=0.5, help="share of windows in which a voice that a clip lacks is heard to be silent: sessions have both [0.5]")
     parser.add_argument("--init", help="flow checkpoint whose weights to start from")
     common.arguments(parser, steps=20000, lr=1.2e-3, batch=32)
     args = parser.parse_args()
     device, team = common.start_process(args), Team(args.workers)
     audio = load_audio(args.end_to_end, device).train() if args.end_to_end else None
     hearing = {"audio": audio, "voices": team.first(lambda: voices_of(args.corpus, "train", device)), "live": args.live} if audio else {}
-    train = Windows(os.path.join(args.cache, "train.pt"), args.blocks, device=device, sounds=args.sounds, **hearing)
+    train = Windows(os.path.join(args.cache, "train.pt"), args.blocks, device=device, sounds=args.sounds, away=args.away, quiet=args.quiet, **hearing)
     vae, mean, std, kept = load_vae(args.vae, device)
     plain = Windows(os.path.join(args.cache, "train.pt"), 16, jitter=False, device=device)
     metric = latent_metric(vae, mean, std, plain.batch(24)[0], train.mean.to(device), train.std.to(device), form=form_of(kept))

@@ -15,7 +15,7 @@ import torch
 
 from ..hearing import ears
 from ..mospa.react import REACTIONS
-from ..nets.flow import GAZE, Condition
+from ..nets.flow import GAZE, USER, Condition
 from ..nets.stream import DecoderStream, Stream, branches, combine, history_time, midpoint, reacting
 from . import common
 from .cache import load_vae
@@ -60,6 +60,7 @@ class Rollouts:
         place = w.draw(size)
         z, cond = w.read(*place)
         cond, frames = targets(cond, gaze), w.frames(*place)
+        cond.flags[..., USER:USER + 1] *= w.seen(size)
         eps, root = temperature * torch.randn_like(z), w.roots[frames[:, 4 * warm + 3]]
         stream = Stream(net, size, gaze=gaze, tau_history=tau_history, single=True)
         stream.warm(z[:, :warm], eps[:, :warm], cond.at(slice(warm)))
@@ -179,11 +180,13 @@ def main():
     parser.add_argument("--matching", type=float, default=0.0, help="weight of distribution matching (train/matching.py) [0]")
     parser.add_argument("--adversarial", type=float, default=0.0, help="weight of the adversarial loss on decoded motion [0]")
     parser.add_argument("--sounds", type=float, default=1.0, help="how much more often windows with sounds are drawn than their length says [1]")
+    parser.add_argument("--away", type=float, default=0.1, help="share of windows and roll-outs in which the user is not seen [0.1]")
+    parser.add_argument("--quiet", type=float, default=0.5, help="share of windows in which a voice that a clip lacks is heard to be silent: sessions have both [0.5]")
     parser.add_argument("--memory", type=int, default=800, help="sequences that updates draw on")
     common.arguments(parser, steps=3000, lr=4e-4, batch=16)
     args = parser.parse_args()
     device, team = common.start_process(args), Team(args.workers)
-    windows = Windows(os.path.join(args.cache, "train.pt"), args.blocks, 0.03, 0.02, 0, 0.05, device=device, sounds=args.sounds)
+    windows = Windows(os.path.join(args.cache, "train.pt"), args.blocks, 0.03, 0.02, 0, 0.05, device=device, sounds=args.sounds, away=args.away, quiet=args.quiet)
     vae, mean, std, _ = load_vae(args.vae, device)
     vae.requires_grad_(False)
     (teacher, base), (net, _) = load_flow(args.flow, device), load_flow(args.flow, device)

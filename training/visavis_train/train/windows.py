@@ -4,7 +4,7 @@ import torch.nn.functional as F
 
 from ..hearing import ears
 from ..motion import rig
-from ..nets.flow import GAZE, Condition
+from ..nets.flow import GAZE, USER, Condition
 from . import common
 from .common import mixed
 from .data import Split
@@ -28,12 +28,13 @@ class Windows:
     """Random windows of `blocks` blocks from a cache file, on `device`. With `audio`, an encoder in training, the first `live` windows of a batch
     (or all) take their features from `voices` [N, 2, 800] i16, with gradients; the others take the cached ones."""
 
-    def __init__(self, cache, blocks, drop=0.05, drop_all=0.1, drop_gaze=0.35, prefix=0.1, jitter=True, device="cpu", audio=None, voices=None, live=None, sounds=1.0):
-        """`sounds`: how much more often clips in which sounds are heard are drawn than their length says."""
+    def __init__(self, cache, blocks, drop=0.05, drop_all=0.1, drop_gaze=0.35, prefix=0.1, jitter=True, device="cpu", audio=None, voices=None, live=None, sounds=1.0, away=0.0, quiet=0.0):
+        """`sounds`: how much more often clips in which sounds are heard are drawn than their length says; `away`: share of windows in which the user is
+        not seen, all along or until or from some block; `quiet`: share of windows of clips that lack a voice in which it is heard to be silent."""
         state = common.load(cache, mmap=True)
         self.blocks, self.device = blocks, torch.device(device)
         self.drop, self.drop_all, self.drop_gaze, self.prefix, self.jitter = drop, drop_all, drop_gaze, prefix, jitter
-        self.audio, self.live, self.voices = audio, live, voices
+        self.audio, self.live, self.voices, self.away, self.quiet = audio, live, voices, away, quiet
         for name in ("z", "roots", "user", "agent", "voice", "still"):
             setattr(self, name, state[name].to(self.device))
         self.mean, self.std, self.starts, self.has = state["latent_mean"], state["latent_std"], state["starts"], state["has"].float()
@@ -73,9 +74,10 @@ class Windows:
         kind = kind.to(self.device)[:, None]
         gaze = torch.where(kind >= len(SMOOTH), self.gaze[0][now].mean(1, keepdim=True), self.gaze[kind % len(SMOOTH), now])
         flags = torch.ones(b, n, 4, device=self.device)
-        flags[..., 1:3] = self.has[segment[:, 0]].to(self.device)[:, None]
-        together = lambda x: x.float().reshape(b, n, -1)
+        has = torch.maximum(self.has[segment[:, 0]], (torch.rand(b, 2) < self.quiet).float()) if self.quiet else self.has[segment[:, 0]]
+        flags[..., 1:3] = has.to(self.device)[:, None]
         room = self.room(segment, frames, self.roots[before[:, 3::4]]) if self.sound_features else ()
+        together = lambda x: x.float().reshape(b, n, -1)
         return z, Condition(user.flatten(2), together(self.agent[now]), together(self.voice[before]), gaze.reshape(b, n, 4), flags, *room)
 
     def room(self, segment, frames, roots):
@@ -124,7 +126,16 @@ class Windows:
         waves = torch.stack([(both[:, 4:, 0] * kept[:, 4:]), (both[:, :-4, 1] * kept[:, :-4])]).float() / 32768
         with mixed(self.device):
             heard = self.audio(waves.flatten(2).flatten(0, 1))[:, CONTEXT:].float().reshape(2, len(at), self.blocks, -1)
-        return heard * self.has[segment[:, 0]].to(self.device).T[..., None, None]
+        return heard[0], heard[1]
+
+    def seen(self, size):
+        """Flags [B, K, 1] of a user who is away in the share `away` of windows: in two thirds of these all along, in the others until or from some block."""
+        if not self.away:
+            return torch.ones(size, self.blocks, 1, device=self.device)
+        at, kind = torch.randint(1, self.blocks, (size, 1)), torch.randint(0, 6, (size, 1))
+        k = torch.arange(self.blocks)[None]
+        there = torch.where(kind == 0, k >= at, (kind == 1) & (k < at))
+        return (there | (torch.rand(size, 1) >= self.away)).float()[..., None].to(self.device)
 
     def batch(self, size, place=None):
         """Latents [B, K, Dz] and their Condition with some modalities dropped; at places drawn here, or at `place`."""
@@ -153,7 +164,9 @@ class Windows:
             if self.jitter:
                 sound, heard = self.overheard(sound, heard, place[0])
             heard = heard * (every * (torch.arange(n)[None] >= start).float()[..., None]).to(device)
-        return z, Condition(user, agent, voice, cond.gaze, cond.flags * keep.to(device), sound, heard)
+        flags = cond.flags * keep.to(device)
+        flags[..., USER:USER + 1] *= self.seen(size)
+        return z, Condition(user, agent, voice, cond.gaze, flags, sound, heard)
 
 
 def voices_of(corpus, split, device="cpu", workers=1):
