@@ -61,10 +61,10 @@ android/apk/api.py references "$tools/api-29.txt" "$work/classes"
 java -jar "$tools/dx.jar" --dex --min-sdk-version=28 --output="$work/classes.dex" "$work/classes"
 
 echo '-- the stage: body, shaders and colours of the live page'
-node android/apk/stage.mjs models/visavis-base-i8.safetensors "$work/stage.bin"
+node android/apk/stage.mjs models/visavis-room-i8.safetensors "$work/stage.bin"
 
 echo '-- pack and sign'
-repository=("lib/arm64-v8a/libvisavis_jni.so=$so" "classes.dex=$work/classes.dex" "assets/visavis-base-i8.safetensors=models/visavis-base-i8.safetensors"
+repository=("lib/arm64-v8a/libvisavis_jni.so=$so" "classes.dex=$work/classes.dex" "assets/visavis-room-i8.safetensors=models/visavis-room-i8.safetensors"
   "assets/stage.bin=$work/stage.bin" assets/agent.wav=samples/agent.wav assets/user.wav=samples/user.wav)
 python3 android/apk/pack.py "$work/base.apk" "$work/unsigned.apk" "${repository[@]}"
 pass=${KEYSTORE_PASS:-android} alias=${KEY_ALIAS:-androiddebugkey}

@@ -75,7 +75,7 @@ fi
 python3 -c 'import sys, zipfile; zipfile.ZipFile(sys.argv[1]).extract("assets/stage.bin", sys.argv[2])' "$out/demo.apk" "$work"
 java -ea -Djava.awt.headless=true -Djava.library.path="$target/release" -Dvisavis.gl="$gl" -Dvisavis.stage="$work/assets/stage.bin" \
   -Dvisavis.strings=android/demo/src/main/res/values/strings.xml -cp "$work/classes:$work/standins:$work/tests" org.visavis.demo.Pictures \
-  models/visavis-base-i8.safetensors "$out/pictures" >"$work/pictures.log" 2>&1 || { tail -20 "$work/pictures.log"; exit 1; }
+  models/visavis-room-i8.safetensors "$out/pictures" >"$work/pictures.log" 2>&1 || { tail -20 "$work/pictures.log"; exit 1; }
 grep -E '^(loading|stage|measure|failure|  shirt)' "$work/pictures.log"
 
 echo '-- a fault planted in the dex is found'

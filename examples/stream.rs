@@ -21,7 +21,7 @@ const SECONDS: u32 = 12;
 const AUDIO_RATE: u32 = 48_000;
 
 fn main() -> Result<()> {
-    let bundle = std::env::args().nth(1).unwrap_or_else(|| "models/visavis-base-i8.safetensors".to_owned());
+    let bundle = std::env::args().nth(1).unwrap_or_else(|| "models/visavis-room-i8.safetensors".to_owned());
     // Once an application: weights are packed for this CPU. Any number of sessions share the
     // engine.
     let engine = Engine::load(&bundle)?;

@@ -53,7 +53,7 @@ impl Default for Networks {
 /// # fn main() -> visavis::Result<()> {
 /// use visavis::{Engine, SessionOptions};
 ///
-/// let engine = Engine::load("models/visavis-base-i8.safetensors")?;
+/// let engine = Engine::load("models/visavis-room-i8.safetensors")?;
 /// let mut session = engine.session(SessionOptions::default())?;
 /// session.push_user_head(visavis::glam::Vec3::new(0.0, 1.6, 1.5), 0.0)?;
 /// while let Some(frames) = session.poll(0.0)? {
@@ -131,7 +131,7 @@ impl Engine {
     /// # fn main() -> visavis::Result<()> {
     /// // A headset that only ever makes a single step.
     /// let small = Networks { reference: false, encoder: false, modulation: false, ..Networks::default() };
-    /// let engine = Engine::from_bundle(&BundleFile::open("models/visavis-base-i8.safetensors")?, small)?;
+    /// let engine = Engine::from_bundle(&BundleFile::open("models/visavis-room-i8.safetensors")?, small)?;
     /// let session = engine.session(SessionOptions { sampler: Sampler::Single, ..SessionOptions::default() })?;
     /// # Ok(())
     /// # }

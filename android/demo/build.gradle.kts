@@ -36,7 +36,7 @@ dependencies {
 
 // The bundle and the sample conversation, from the repository.
 val sampleAssets by tasks.registering(Copy::class) {
-    from("../../models") { include("visavis-base-i8.safetensors") }
+    from("../../models") { include("visavis-room-i8.safetensors") }
     from("../../samples") { include("agent.wav", "user.wav") }
     into(layout.buildDirectory.dir("sampleAssets"))
 }
@@ -44,7 +44,7 @@ val sampleAssets by tasks.registering(Copy::class) {
 // Body, shaders and colours of the live page; takes Node.js.
 val stageAsset by tasks.registering(Exec::class) {
     dependsOn(sampleAssets) // into the same folder, after it
-    val model = file("../../models/visavis-base-i8.safetensors")
+    val model = file("../../models/visavis-room-i8.safetensors")
     val stage = layout.buildDirectory.dir("sampleAssets").get().asFile.resolve("stage.bin")
     inputs.files(file("../apk/stage.mjs"), fileTree("../../tools/src/export/viewer/stage"), model)
     outputs.file(stage)

@@ -27,7 +27,7 @@ use std::sync::Arc;
 /// use visavis::{Engine, SessionOptions};
 ///
 /// # fn main() -> visavis::Result<()> {
-/// let engine = Engine::load("models/visavis-base-i8.safetensors")?;
+/// let engine = Engine::load("models/visavis-room-i8.safetensors")?;
 /// let mut team = engine.team(2)?;
 /// let mut a = engine.session(SessionOptions { seed: 1, ..SessionOptions::default() })?;
 /// let mut b = engine.session(SessionOptions { seed: 2, ..SessionOptions::default() })?;

@@ -4,7 +4,7 @@ import { fileURLToPath } from "node:url";
 import { root } from "../tests/load.js";
 import { chromium, serve } from "../tests/serve.js";
 
-const [rounds, blocks, bundle] = [Number(process.argv[2] ?? 5), Number(process.argv[3] ?? 200), process.argv[4] ?? "models/visavis-base-i8.safetensors"];
+const [rounds, blocks, bundle] = [Number(process.argv[2] ?? 5), Number(process.argv[3] ?? 200), process.argv[4] ?? "models/visavis-room-i8.safetensors"];
 const BLOCK_MS = 4000 / 30;
 const SAMPLERS = ["midpoint4", "single"];
 const cwd = fileURLToPath(root);

@@ -17,7 +17,7 @@ const configOf = (path) => {
 };
 // The agent's models, of which the first begins: VISAVIS_BUNDLES (paths, separated by spaces), else the quantised ones of models/ that stream, the default first.
 const shipped = () => readdirSync(join(root, "models")).filter((name) => name.endsWith("-i8.safetensors")).map((name) => join(root, "models", name))
-  .filter((path) => configOf(path).kind !== "mospa").sort((a, b) => b.includes("base") - a.includes("base"));
+  .filter((path) => configOf(path).kind !== "mospa").sort((a, b) => b.includes("room") - a.includes("room"));
 const bundles = process.env.VISAVIS_BUNDLES?.split(" ").filter(Boolean) ?? shipped();
 const pack = join(out, "npm"), tools = join(out, "build"), modules = join(tools, "node_modules");
 mkdirSync(tools, { recursive: true });

@@ -120,7 +120,7 @@ fn motion_is_that_of_the_file_that_webassembly_is_compared_with() {
         "# Bundle, blocks, options, digest. src/tests.rs computes them; VISAVIS_DIGESTS=write rewrites.\n",
     );
     let tiny = "tests/goldens/tiny.safetensors";
-    let shipped = "models/visavis-base-i8.safetensors";
+    let shipped = "models/visavis-room-i8.safetensors";
     let cases = [
         (tiny, 24, r#"{"sampler":"midpoint4"}"#),
         (tiny, 24, r#"{"sampler":"midpoint2","gaze":0.8,"seed":7}"#),

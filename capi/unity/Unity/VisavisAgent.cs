@@ -17,7 +17,7 @@ namespace Visavis.Unity
     public sealed class VisavisAgent : MonoBehaviour
     {
         [Tooltip("A bundle in Assets/StreamingAssets.")]
-        public string bundle = "visavis-base-i8.safetensors";
+        public string bundle = "visavis-room-i8.safetensors";
 
         [Tooltip("The Humanoid avatar; none: spheres.")]
         public Animator animator;

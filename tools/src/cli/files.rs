@@ -6,7 +6,7 @@ use visavis_tools::offline::{Conversation, Sound};
 use visavis_tools::room;
 
 /// The shipped bundles; the first that is there is the default.
-const MODELS: [&str; 2] = ["models/visavis-base-i8.safetensors", "models/visavis-base.safetensors"];
+const MODELS: [&str; 2] = [ROOM_MODEL, "models/visavis-base.safetensors"];
 
 /// The shipped bundle with hearing.
 const ROOM_MODEL: &str = "models/visavis-room-i8.safetensors";

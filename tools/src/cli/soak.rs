@@ -20,7 +20,7 @@ pub struct SoakArgs {
     /// Prints JSON
     #[arg(long)]
     pub json: bool,
-    /// Bundle [default: models/visavis-base-i8.safetensors here, beside the program, or in its
+    /// Bundle [default: models/visavis-room-i8.safetensors here, beside the program, or in its
     /// source folder]
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,

@@ -17,7 +17,7 @@
 //! use visavis::Engine;
 //! use visavis_tools::eval::{Clip, EvalOptions, evaluate};
 //!
-//! let engine = Engine::load("models/visavis-base-i8.safetensors")?;
+//! let engine = Engine::load("models/visavis-room-i8.safetensors")?;
 //! let clips = Clip::list("corpus/test", &engine.config().rig)?;
 //! let report = evaluate(&engine, &clips, None, &EvalOptions::default(), &|_| {})?;
 //! println!("{}", report.to_text());

@@ -14,7 +14,7 @@
 //! use visavis::{Engine, SessionOptions};
 //! use visavis_tools::offline::{Conversation, run};
 //!
-//! let engine = Engine::load("models/visavis-base-i8.safetensors")?;
+//! let engine = Engine::load("models/visavis-room-i8.safetensors")?;
 //! let mut session = engine.session(SessionOptions::default())?;
 //! let talk = Conversation::read(Some("agent.wav".as_ref()), None, Some("user.csv".as_ref()))?;
 //! let outcome = run(&mut session, &talk, &mut |p| eprintln!("{} of {} frames", p.frames, p.total))?;

@@ -14,7 +14,7 @@ import org.visavis.VisavisEngine;
  * as it was; it ends when the last activity that attached itself is finished. Methods are for the main thread unless they say otherwise.
  */
 final class Demo {
-    static final String BUNDLE = "visavis-base-i8.safetensors";
+    static final String BUNDLE = "visavis-room-i8.safetensors";
     private static Demo current;
 
     final Life life = new Life();
