@@ -157,7 +157,7 @@ def main():
     parser.add_argument("--apart", type=float, default=0.35, help="share of time on the regime with history and current apart")
     parser.add_argument("--slip", type=float, default=0.15)
     parser.add_argument("--late", type=float, default=0.0, help="weight on late flow times: errors weigh (1 - tau)^-LATE; 2 weighs velocities alike [0]")
-    parser.add_argument("--still", type=float, default=0.0, help="blocks in which the corpus' hands are still weigh 1 + STILL [0]")
+    parser.add_argument("--still", type=float, default=0.0, help="blocks in which the corpus' hands are still weigh 1 + STILL, and come out as much more often [0]")
     parser.add_argument("--end-to-end", metavar="AUDIO", help="audio checkpoint to train along; needs --init and --corpus")
     parser.add_argument("--corpus", help="corpus of the cache, for --end-to-end")
     parser.add_argument("--live", type=int, help="windows of a batch whose voices --end-to-end hears, others taking cached features [all]")
