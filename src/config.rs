@@ -260,6 +260,9 @@ pub struct StudentConfig {
     pub guidance: f32,
     /// Gaze guidance weight that was distilled in.
     pub gaze_guidance: f32,
+    /// Scale of the noise of blocks that it makes; absent: that of all blocks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<f32>,
 }
 
 /// Defaults for sessions.

@@ -5,7 +5,7 @@ mod common;
 
 use common::{Inputs, golden_path, run, tiny};
 use std::sync::Arc;
-use visavis::internals::config::{GazeConfig, GazeCurve};
+use visavis::internals::config::{Config, GazeConfig, GazeCurve};
 use visavis::internals::session::{Diagnostics, GazeControl};
 use visavis::{BundleFile, Engine, ErrorKind, Frame, Sampler, SessionOptions};
 
@@ -26,7 +26,8 @@ fn control(gaze_control: GazeControl) -> Diagnostics {
 }
 
 fn with(gaze: &GazeConfig) -> visavis::Result<Arc<Engine>> {
-    let bytes = BundleFile::open(golden_path("tiny.safetensors"))?.with_gaze(gaze)?;
+    let config = Config { gaze: Some(gaze.clone()), ..tiny().config().clone() };
+    let bytes = BundleFile::open(golden_path("tiny.safetensors"))?.with_settings(&config)?;
     Engine::from_bytes(bytes, "calibrated")
 }
 

@@ -7,7 +7,7 @@ use common::{Inputs, golden_path, hearing, hearing_bytes, hearing_f32, motion_of
 use safetensors::SafeTensors;
 use std::sync::Arc;
 use visavis::internals::bundle::{TensorInfo, int16_activations};
-use visavis::internals::config::{GazeConfig, GazeCurve};
+use visavis::internals::config::{Config, GazeConfig, GazeCurve};
 use visavis::internals::kernels::{Kernels, Scheme};
 use visavis::internals::quant::{Budget, Keep, Options, Scene, Sound, Teacher, quantise};
 use visavis::internals::session::{Anchoring, Diagnostics, GazeControl};
@@ -31,7 +31,8 @@ fn with_gaze() -> Arc<Engine> {
         levels: vec![-0.3, 0.2, 0.9],
         seconds: 1.0,
     };
-    let bytes = BundleFile::open(golden_path("tiny.safetensors")).unwrap().with_gaze(&gaze).unwrap();
+    let file = BundleFile::open(golden_path("tiny.safetensors")).unwrap();
+    let bytes = file.with_settings(&Config { gaze: Some(gaze), ..tiny().config().clone() }).unwrap();
     Engine::from_bytes(bytes, "calibrated").unwrap()
 }
 

@@ -3,10 +3,12 @@
 
 mod common;
 
-use common::{Inputs, dram, motion, motion_of, poll_blocks, run, tiny};
+use common::{Inputs, dram, golden_path, motion, motion_of, poll_blocks, run, tiny};
 use glam::Vec3;
+use std::sync::Arc;
+use visavis::internals::config::StudentConfig;
 use visavis::internals::session::{Diagnostics, Probe};
-use visavis::{BLOCK_FRAMES, ErrorKind, FPS, Frame, Sampler, Session, SessionOptions, Speaker};
+use visavis::{BLOCK_FRAMES, BundleFile, Engine, ErrorKind, FPS, Frame, Sampler, Session, SessionOptions, Speaker};
 
 const BLOCKS: usize = 30;
 
@@ -315,6 +317,26 @@ fn temperature_scales_the_noise() {
     assert_ne!(run(1, 0.5)[0].global, run(1, 1.0)[0].global);
     let refused = tiny().session(SessionOptions { temperature: Some(-0.1), ..options() });
     assert_eq!(refused.unwrap_err().kind(), ErrorKind::Argument);
+}
+
+/// A bundle may give its student a temperature of its own: blocks of the single step go by it, all
+/// others and whoever asks for one do not.
+#[test]
+fn the_single_step_may_have_a_temperature_of_its_own() {
+    let inputs = inputs();
+    let mut config = tiny().config().clone();
+    config.student = config.student.map(|student| StudentConfig { temperature: Some(0.5), ..student });
+    let bytes = BundleFile::open(golden_path("tiny.safetensors")).unwrap().with_settings(&config).unwrap();
+    let own = Engine::from_bytes(bytes, "own").unwrap();
+    let at = |engine: &Arc<Engine>, sampler, temperature| {
+        let options = SessionOptions { sampler, temperature, ..options() };
+        run(&mut engine.session(options).unwrap(), &inputs, 6)
+    };
+    let usual = config.session.temperature;
+    assert_ne!(usual, 0.5);
+    assert_eq!(at(&own, Sampler::Single, None), at(&tiny(), Sampler::Single, Some(0.5)));
+    assert_eq!(at(&own, Sampler::Single, Some(usual)), at(&tiny(), Sampler::Single, None));
+    assert_eq!(at(&own, Sampler::Midpoint2, None), at(&tiny(), Sampler::Midpoint2, None));
 }
 
 #[test]

@@ -110,6 +110,7 @@ fn sarah(c: &Config) -> Result<()> {
         real("student.tau_history", s.tau_history, 0.0, 1.0)?;
         real("student.guidance", s.guidance, 0.0, 20.0)?;
         real("student.gaze_guidance", s.gaze_guidance, 0.0, 20.0)?;
+        real("student.temperature", s.temperature.unwrap_or(1.0), 0.0, 2.0)?;
     }
     real("session.guidance", c.session.guidance, 0.0, 20.0)?;
     real("session.gaze_guidance", c.session.gaze_guidance, 0.0, 20.0)?;

@@ -1,7 +1,7 @@
 //! A bundle's file put together anew.
 
 use super::{BundleFile, CONFIG_KEY, StoredData, StoredWeights};
-use crate::config::GazeConfig;
+use crate::config::Config;
 use crate::error::{Error, ErrorKind, Result};
 use crate::kernels::I4_GROUP;
 use half::f16;
@@ -54,14 +54,21 @@ pub(crate) fn failed(what: impl std::fmt::Display) -> Error {
 }
 
 impl BundleFile<'_> {
-    /// The bytes of this bundle with another calibration of its gaze; all else stays.
+    /// The bytes of this bundle with the defaults for sessions, the student's settings and the
+    /// calibration of gaze of `settings`; all else stays.
     ///
     /// # Errors
     /// [`ErrorKind::BundleCorrupt`] or [`ErrorKind::BundleInvalid`].
-    pub fn with_gaze(&self, gaze: &GazeConfig) -> Result<Vec<u8>> {
+    pub fn with_settings(&self, settings: &Config) -> Result<Vec<u8>> {
         let (json, tensors) = self.raw()?;
         let mut config: serde_json::Value = serde_json::from_str(&json).map_err(failed)?;
-        config["gaze"] = serde_json::to_value(gaze).map_err(failed)?;
+        let settings = serde_json::to_value(settings).map_err(failed)?;
+        for key in ["session", "student", "gaze"] {
+            match settings.get(key) {
+                Some(value) => config[key] = value.clone(),
+                None => drop(config.as_object_mut().and_then(|config| config.remove(key))),
+            }
+        }
         let entries = tensors.iter().map(|(n, v)| (n.to_owned(), v.dtype(), v.shape().to_vec(), v.data().to_vec()));
         assemble(&config, &entries.collect::<Vec<_>>())
     }

@@ -99,7 +99,7 @@ impl Block<'_> {
                 if self.outcome.is_err() {
                     return;
                 }
-                let temperature = options.temperature(&engine.config);
+                let temperature = options.temperature(&engine.config, plan.sampler);
                 let guidance = options.guidance(engine, inputs.reaction());
                 maker.generator.begin(plan.sampler, guidance, &inputs.condition, |token, eps| {
                     maker.noise.fill(options, temperature, token, eps);

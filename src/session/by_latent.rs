@@ -91,7 +91,7 @@ impl ByLatent {
         self.decoder.reset(first);
         self.anchor.reset(options.start, first);
         tools.exec.begin();
-        let temperature = options.temperature(tools.config);
+        let temperature = options.temperature(tools.config, options.sampler);
         let blocks = idle.values().len() / model.latent.width();
         for i in 0..blocks {
             let z = idle.part(i..i + 1, model.latent.width());

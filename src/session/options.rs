@@ -109,8 +109,10 @@ impl SessionOptions {
         }
     }
 
-    pub(super) fn temperature(&self, config: &Config) -> f32 {
-        self.temperature.unwrap_or(config.session.temperature)
+    /// Of a block that `sampler` makes.
+    pub(super) fn temperature(&self, config: &Config, sampler: Sampler) -> f32 {
+        let student = config.student.filter(|_| sampler == Sampler::Single).and_then(|student| student.temperature);
+        self.temperature.or(student).unwrap_or(config.session.temperature)
     }
 
     pub(super) fn clean_history(&self, engine: &Engine) -> Option<CleanHistory> {

@@ -149,8 +149,11 @@ fn networks(c: &Config, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     match c.student {
         Some(s) => writeln!(
             f,
-            "  student  single step, history at tau {}, guidance {} and gaze guidance {} distilled in",
-            s.tau_history, s.guidance, s.gaze_guidance
+            "  student  single step, history at tau {}, guidance {} and gaze guidance {} distilled in{}",
+            s.tau_history,
+            s.guidance,
+            s.gaze_guidance,
+            s.temperature.map_or_else(String::new, |t| format!(", temperature {t}"))
         )?,
         None => writeln!(f, "  student  none: the sampler \"single\" is not available")?,
     }

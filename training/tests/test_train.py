@@ -51,12 +51,13 @@ def made_windows(tmp_path, blocks=16, clips=2, frames=160, latent=8, **kw):
     return windows.Windows(path, blocks, **kw)
 
 
-def test_blocks_that_turn_are_told_from_those_that_sway(tmp_path):
-    w = made_windows(tmp_path, blocks=8, clips=1, jitter=False)
-    rate = torch.cat([torch.full((80,), 0.2), torch.full((80,), 0.6)])     # rad/s
-    w.roots[:, 2] = torch.remainder((rate.double() / 30).cumsum(0) + 3.0, 2 * math.pi)     # the heading wraps on the way
-    turns = w.turning(w.segments[:1], torch.tensor([w.segments[0, 3] // 2 - 5]))[0]
-    assert turns[0] == 0 and turns[-1] == 1 and turns.diff().abs().sum() == 1
+def test_a_user_who_is_seen_aside_is_told_from_one_in_front_or_unseen():
+    angle = torch.tensor([0.0, 0.5, 0.7, -0.7, 3.1, 0.7])
+    user = torch.stack([angle.sin(), angle.cos()], -1).repeat(1, 4)[None]
+    flags = torch.ones(1, 6, 4)
+    flags[0, 5, 0] = 0
+    cond = windows.Condition(user, None, None, None, flags)
+    assert windows.aside(cond)[0].tolist() == [0, 0, 1, 1, 1, 0]
 
 
 def test_compact_frames_expand_to_the_feature_vector():

@@ -19,6 +19,12 @@ SESSION = {"guidance": 1.5, "gaze_guidance": 2.0, "temperature": 0.75, "clean_hi
 KEY = "visavis"
 
 
+def temperature(config, student=False):
+    """Scale of the noise in sessions on the reference sampler or the student."""
+    own = (config.get("student") or {}).get("temperature") if student else None
+    return config["session"].get("temperature", 1.0) if own is None else own
+
+
 def _rename(name):
     """Module path -> tensor name of the bundle: attention projections sit directly in the layer."""
     return name.replace(".attn.", ".")

@@ -93,6 +93,7 @@ def main():
     parser.add_argument("--half", action="store_true", help="f16 weights")
     for name in ("guidance", "gaze-guidance", "temperature"):
         parser.add_argument(f"--{name}", type=float, help="default of sessions")
+    parser.add_argument("--student-temperature", type=float, help="of sessions on the student [as the others']")
     parser.add_argument("--reaction-guidance", type=float, default=1.0, help="how many times as far guidance goes while a sound is reacted to [1]")
     args = parser.parse_args()
     if (args.hearing is None) != (args.appraisal is None):
@@ -112,6 +113,8 @@ def main():
                                load_audio(args.hearing) if args.hearing else None, appraise.load(args.appraisal) if args.appraisal else None)
     if args.hearing:
         config["hearing"]["guidance"] = args.reaction_guidance
+    if args.student_temperature is not None:
+        config["student"]["temperature"] = args.student_temperature
     bundle.write(args.out, tensors, config, half=args.half, narrow=NARROW)
     print(f"{args.out}: {os.path.getsize(args.out) / 1e6:.1f} MB")
 

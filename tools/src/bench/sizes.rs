@@ -107,7 +107,7 @@ impl Size {
             dram: None,
             mospa: None,
             hearing: None,
-            student: Some(StudentConfig { tau_history: 0.9, guidance: 2.0, gaze_guidance: 1.5 }),
+            student: Some(StudentConfig { tau_history: 0.9, guidance: 2.0, gaze_guidance: 1.5, temperature: None }),
             session: SessionConfig {
                 guidance: 1.3,
                 gaze_guidance: 1.5,

@@ -1,15 +1,17 @@
-//! `visavis calibrate`: measures what a model's gaze channel does, and writes it into its bundle.
+//! `visavis calibrate`: measures what a model's gaze channel does, and writes it into its bundle, with other defaults for
+//! sessions where they are given.
 
 use super::eval::show;
+use super::values::{GuidanceArgs, temperature};
 use super::{files, print};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Mutex;
-use visavis::internals::config::{GazeConfig, GazeCurve};
+use visavis::internals::config::{Config, GazeConfig, GazeCurve};
 use visavis::internals::kernels::Kernels;
-use visavis::{BundleFile, Engine, Result};
+use visavis::{BundleFile, Engine, Error, ErrorKind, Result};
 use visavis_tools::eval::{Clip, calibrate};
 use visavis_tools::export::write_atomically;
 
@@ -31,18 +33,49 @@ pub struct CalibrateArgs {
     /// Threads, each on windows of its own; the result is the same
     #[arg(long, value_name = "N", default_value = "2", value_parser = RangedU64ValueParser::<usize>::new().range(1..=64))]
     pub threads: usize,
+    #[command(flatten)]
+    pub weights: GuidanceArgs,
+    /// Scale of the noise, 0 to 2 [default: the model's]
+    #[arg(long, value_name = "T", value_parser = temperature, allow_negative_numbers = true)]
+    pub temperature: Option<f32>,
+    /// Scale of the noise of the single step, 0 to 2 [default: the model's]
+    #[arg(long, value_name = "T", value_parser = temperature, allow_negative_numbers = true)]
+    pub student_temperature: Option<f32>,
+}
+
+impl CalibrateArgs {
+    /// The bundle's settings with those that were given.
+    fn settings(&self, mut config: Config) -> Result<Config> {
+        let session = &mut config.session;
+        session.guidance = self.weights.guidance.unwrap_or(session.guidance);
+        session.gaze_guidance = self.weights.gaze_guidance.unwrap_or(session.gaze_guidance);
+        session.temperature = self.temperature.unwrap_or(session.temperature);
+        match (&mut config.student, self.student_temperature) {
+            (Some(student), Some(t)) => student.temperature = Some(t),
+            (None, Some(_)) => {
+                let text = "--student-temperature: this bundle has no student network";
+                return Err(Error::new(ErrorKind::Argument, text));
+            }
+            (_, None) => {}
+        }
+        Ok(config)
+    }
 }
 
 pub fn run(args: &CalibrateArgs) -> Result<()> {
     files::apart(&args.input, &args.output)?;
     let file = BundleFile::open(&args.input)?;
+    let mut settings = args.settings(file.parse()?.0)?;
+    let file = BundleFile::from_bytes(file.with_settings(&settings)?, &args.input);
     let engine = Engine::from_file(&file, Kernels::detect()?)?;
     let clips = Clip::list(&args.clips, &engine.config().rig)?;
     let stage = Mutex::new(String::new());
     let gaze = calibrate(&engine, &clips, args.windows, args.threads, &|p| show(&stage, p))?;
-    let bytes = file.with_gaze(&gaze)?;
+    let text = summary(args, &gaze);
+    settings.gaze = Some(gaze);
+    let bytes = file.with_settings(&settings)?;
     write_atomically(&args.output, |w| w.write_all(&bytes))?;
-    print(&summary(args, &gaze))
+    print(&text)
 }
 
 fn summary(args: &CalibrateArgs, gaze: &GazeConfig) -> String {

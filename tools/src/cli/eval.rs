@@ -1,6 +1,6 @@
 //! `visavis eval`: a bundle judged on recorded conversations.
 
-use super::values::{GuidanceArgs, number};
+use super::values::{GuidanceArgs, temperature};
 use super::{files, print};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
@@ -63,10 +63,6 @@ pub struct EvalArgs {
     /// Seed of all windows; another one tells what chance alone changes
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u32,
-}
-
-fn temperature(text: &str) -> std::result::Result<f32, String> {
-    number(text, 0.0, 2.0)
 }
 
 fn row(text: &str) -> std::result::Result<(String, PathBuf), String> {

@@ -101,7 +101,7 @@ pub struct Report {
     /// elsewhere, then the gaze targets.
     pub rows: Vec<Row>,
     /// Nobody speaks and the user stands: `real people`, `corpus` where it has such stretches, then
-    /// the samplers.
+    /// the samplers, each also where no user is seen.
     pub idle: Vec<Idle>,
     /// How lively real people are who talk.
     pub real_talk: crate::metrics::Liveliness,
@@ -208,7 +208,9 @@ pub fn evaluate(
     for &sampler in &samplers {
         let seed = u64::from(options.seed) << 32;
         let session = SessionOptions { sampler, gaze: None, seed, ..options.session.clone() };
-        idle.push(Idle::of_sessions(engine, &session, options.threads, options.quick)?);
+        for seen in [true, false] {
+            idle.push(Idle::of_sessions(engine, &session, seen, options.threads, options.quick)?);
+        }
     }
 
     let session = SessionOptions { sampler: samplers[0], gaze: None, ..options.session.clone() };

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use visavis::{Engine, FPS, Frame, Result, SessionOptions};
 
 /// Runs a session over voices (full scale 1) and a user's head (one position per frame, and where
-/// it was recorded one rotation).
+/// it was recorded one rotation; none: nobody is seen).
 pub(super) fn generate(
     engine: &Arc<Engine>,
     options: SessionOptions,
@@ -22,12 +22,12 @@ pub(super) fn generate(
     // A path ends with its last point; the last frame has a length too.
     points.extend(points.last().map(|(_, p)| (at(points.len()), *p)));
     let count = points.len();
-    let mut path = UserPath::from_points(points)?;
-    if let Some(rotations) = rotations {
+    let mut path = (count > 0).then(|| UserPath::from_points(points)).transpose()?;
+    if let (Some(seen), Some(rotations)) = (path.take_if(|_| rotations.is_some()), rotations) {
         let last = rotations.last().into_iter();
-        path = path.with_rotations(rotations.iter().chain(last).copied().take(count).collect())?;
+        path = Some(seen.with_rotations(rotations.iter().chain(last).copied().take(count).collect())?);
     }
-    let talk = Conversation::new(agent, user, Some(path))?;
+    let talk = Conversation::new(agent, user, path)?;
     run(&mut engine.session(options)?, &talk, &mut |_| {})
 }
 

@@ -29,7 +29,7 @@ const QUIET: usize = 2 * FPS as usize;
 /// A motion at rest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Idle {
-    /// Whose: `real people`, `corpus` or a sampler's.
+    /// Whose: `real people`, `corpus`, a sampler's, or a sampler's where no user is seen.
     pub name: String,
     /// Its measures.
     pub figures: Liveliness,
@@ -87,17 +87,18 @@ impl Idle {
         Ok((figures.seconds > 0.0).then(|| Self { name: "corpus".into(), figures }))
     }
 
-    /// Silent sessions with a user who stands before the agent.
+    /// Silent sessions with a user who stands before the agent, or without one.
     pub(super) fn of_sessions(
         engine: &Arc<Engine>,
         options: &SessionOptions,
+        seen: bool,
         threads: usize,
         quick: bool,
     ) -> Result<Self> {
         let (runs, frames) = if quick { (1, 20 * FPS as usize) } else { (RUNS, SECONDS * FPS as usize) };
         let tallies = each(threads, runs, &|_| {}, &|run| {
             let voice = || Some(vec![0.0; frames * FRAME_SAMPLES]);
-            let user = std::iter::repeat_n(Vec3::new(0.0, 1.65, 1.6), frames);
+            let user = std::iter::repeat_n(Vec3::new(0.0, 1.65, 1.6), if seen { frames } else { 0 });
             let options = SessionOptions { seed: options.seed + run as u64, ..options.clone() };
             let motion = generate(engine, options, [voice(), voice()], user, None)?.recording;
             let mut tally = Tally::default();
@@ -107,8 +108,14 @@ impl Idle {
         })?;
         let mut all = Tally::default();
         tallies.into_iter().for_each(|tally| all.merge(tally));
-        Ok(Self { name: made_with(engine, options.sampler), figures: all.row() })
+        let name = made_with(engine, options.sampler);
+        Ok(Self { name: if seen { name } else { alone(&name) }, figures: all.row() })
     }
+}
+
+/// Name of a sampler's row at rest without a user.
+pub(super) fn alone(name: &str) -> String {
+    format!("{name}, nobody seen")
 }
 
 /// Frames in which nobody speaks, nor does within two seconds, and the user stands.

@@ -4,7 +4,7 @@ use super::endurance::{Endurance, Follow};
 use super::figures::Row;
 use super::reaction::Reaction;
 use super::reconstruction::Reconstruction;
-use super::{Dial, Report};
+use super::{Dial, Report, people};
 use serde::Serialize;
 use visavis::internals::pose::{DEFECTIVE_HELD, DEFECTIVE_TRIPS_A_MINUTE};
 
@@ -81,9 +81,9 @@ fn motion(report: &Report, truth: &Row, row: &Row) -> Vec<Verdict> {
     let chance = m.beat.zip(m.beat_shuffled).map(|(a, b)| a - b);
     let mut all = vec![
         at_most(&name("head angle, gaze off"), "within 0.03 of the corpus", gaze, 0.03),
-        between(&name("wrist var"), "0.8 to 1.2 of the corpus", wrists, 0.8, 1.2),
-        between(&name("wrist var, speaking / not"), "0.8 to 1.2 of the corpus' ratio", ratio, 0.8, 1.2),
-        between(&name("beat"), "at least 0.7 of the corpus", beat, 0.7, f64::INFINITY),
+        between(&name("wrist var"), "0.9 to 1.1 of the corpus", wrists, 0.9, 1.1),
+        between(&name("wrist var, speaking / not"), "0.9 to 1.1 of the corpus' ratio", ratio, 0.9, 1.1),
+        between(&name("beat"), "at least 0.9 of the corpus", beat, 0.9, f64::INFINITY),
         between(&name("beat above shuffled voice"), "at least 0.05", chance, 0.05, f64::INFINITY),
         at_most(&name("foot slide above the corpus"), "at most 0.01", slide, 0.01),
         at_most(
@@ -95,15 +95,10 @@ fn motion(report: &Report, truth: &Row, row: &Row) -> Vec<Verdict> {
         at_most(&name("seam"), "at most 1.15", m.seam, 1.15),
     ];
     if let Some(nearest) = report.row("NN") {
-        all.push(at_most(&name("FGD"), "at most 1.5 x NN", part(m.fgd, nearest.all.fgd), 1.5));
+        all.push(at_most(&name("FGD"), "at most that of NN", part(m.fgd, nearest.all.fgd), 1.0));
     }
     if let Some(single) = report.row("single").filter(|single| single.name != row.name) {
-        all.push(at_most(
-            "FGD, single step",
-            &format!("at most 1.25 x {}", row.name),
-            part(single.all.fgd, m.fgd),
-            1.25,
-        ));
+        all.push(at_most("FGD, single step", &format!("at most 1.1 x {}", row.name), part(single.all.fgd, m.fgd), 1.1));
     }
     all
 }
@@ -114,7 +109,8 @@ fn at_rest(report: &Report) -> Vec<Verdict> {
     let (Some(real), Some(first)) = (row("real people"), report.models().next()) else { return Vec::new() };
     let single = report.row("single").filter(|single| single.name != first.name);
     let mut all = Vec::new();
-    for own in std::iter::once(first).chain(single).filter_map(|model| row(&model.name)) {
+    let both = |model: &Row| [row(&model.name), row(&people::alone(&model.name))];
+    for own in std::iter::once(first).chain(single).flat_map(both).flatten() {
         let (r, m) = (&real.figures, &own.figures);
         for (what, real, value) in [
             ("stillness", r.stillness, m.stillness),

@@ -4,6 +4,7 @@ use super::*;
 use crate::offline::Conversation;
 use crate::offline::UserPath;
 use glam::Vec3;
+use visavis::internals::config::Config;
 
 /// Half a minute of two voices that take turns, and a user who goes round the agent.
 pub(super) fn talk() -> Conversation {
@@ -200,7 +201,8 @@ fn calibration_measures_the_channel() {
             assert_eq!(gaze, again);
             let file =
                 visavis::BundleFile::open(concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/goldens/tiny.safetensors"));
-            let bytes = file.unwrap().with_gaze(&gaze).unwrap();
+            let settings = Config { gaze: Some(gaze.clone()), ..engine.config().clone() };
+            let bytes = file.unwrap().with_settings(&settings).unwrap();
             assert_eq!(Engine::from_bytes(bytes, "calibrated").unwrap().config().gaze, Some(gaze.clone()));
             assert!(gaze.levels.iter().all(|l| *l > 0.8), "the procedural person looks at the user: {:?}", gaze.levels);
         }

@@ -107,7 +107,7 @@ def roll(b, w, chosen, student=False, seed=0, hears="sounds"):
     cond.flags[..., GAZE] = 1
     settings = dict(student=True, tau=b.config["student"]["tau_history"]) if student else dict(student=False, tau=session["clean_history"]["tau"])
     stream = Stream(b.student if student else b.flow, n, session["guidance"], session["gaze_guidance"], True, 4, settings["tau"], session["clean_history"]["from"], student)
-    eps = session["temperature"] * torch.randn_like(z)
+    eps = bundles.temperature(b.config, student) * torch.randn_like(z)
     stream.warm(z[:, :WARM], eps[:, :WARM], cond.at(slice(WARM)))
     decoder, placed = DecoderStream(b.vae.decoder), lambda z: z * b.stat("latent_std") + b.stat("latent_mean")
     root = w.roots[frames[:, 3]]

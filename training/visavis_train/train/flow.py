@@ -23,7 +23,7 @@ from .loop import Loop
 from .sizes import SIZES
 from .team import Team
 from .vae import channel_weights
-from .windows import Windows, voices_of
+from .windows import Windows, aside, voices_of
 
 
 @torch.no_grad()
@@ -157,12 +157,11 @@ def main():
     parser.add_argument("--apart", type=float, default=0.35, help="share of time on the regime with history and current apart")
     parser.add_argument("--slip", type=float, default=0.15)
     parser.add_argument("--late", type=float, default=0.0, help="weight on late flow times: errors weigh (1 - tau)^-LATE; 2 weighs velocities alike [0]")
-    parser.add_argument("--still", type=float, default=0.0, help="blocks in which the corpus' hands are still weigh 1 + STILL, and come out as much more often [0]")
     parser.add_argument("--end-to-end", metavar="AUDIO", help="audio checkpoint to train along; needs --init and --corpus")
     parser.add_argument("--corpus", help="corpus of the cache, for --end-to-end")
     parser.add_argument("--live", type=int, help="windows of a batch whose voices --end-to-end hears, others taking cached features [all]")
-    parser.add_argument("--react", type=float, default=0.0, help="blocks in which the body reacts to a sound weigh 1 + REACT [0]")
-    parser.add_argument("--turn", type=float, default=0.0, help="blocks in which the body turns weigh 1 + TURN [0]")
+    parser.add_argument("--react", type=float, default=0.0, help="blocks in which what is heard calls for a reaction weigh 1 + REACT [0]")
+    parser.add_argument("--turn", type=float, default=0.0, help="blocks in which the user is seen aside of the heading weigh 1 + TURN [0]")
     parser.add_argument("--fresh", type=float, default=1.0, help="factor on the learning rate of what embeds sounds [1]")
     parser.add_argument("--sounds", type=float, default=1.0, help="how much more often windows with sounds are drawn than their length says [1]")
     parser.add_argument("--away", type=float, default=0.1, help="share of windows in which the user is not seen, beside the dropout of every modality [0.1]")
@@ -203,9 +202,9 @@ def main():
         kinds = {k: torch.compile(f, dynamic=False) for k, f in kinds.items()}
     for step in loop:
         apart = team.draw(args.seed, step) < share  # the same regime in all processes: none waits for the dearer one
-        place = train.draw(args.batch)
-        z, cond = train.batch(args.batch, place)
-        weight = 1 + args.still * train.stillness(*place) + args.react * train.reacting(*place) + args.turn * train.turning(*place)
+        z, cond = train.batch(args.batch)
+        # Weights go by what a block is told: by what the data does in it they would change how often that comes out.
+        weight = 1 + args.react * train.called(cond) + args.turn * aside(cond)
         loss = kinds[apart](net, z, cond, metric, args.slip, weight / weight.mean(), args.late)
         loop.update(loss, **{"apart" if apart else "shared": loss})
         loop.report(100, measure, 500)

@@ -57,7 +57,7 @@ def roll(b, batch, target=None, student=False, steps=4, seed=0, guidance=None, g
                     session["gaze_guidance"] if gaze_guidance is None else gaze_guidance, target is not None, steps,
                     b.config["student"]["tau_history"] if student else tau_history,
                     clean_from, student)
-    heat = session.get("temperature", 1.0) if temperature is None else temperature
+    heat = bundles.temperature(b.config, student) if temperature is None else temperature
     idle = b.encode(b.idle()[None]).expand(n, -1, -1)
     m = idle.shape[1]
     noise = lambda k: torch.randn(n, k, latent, generator=g)

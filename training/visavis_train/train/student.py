@@ -13,8 +13,6 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from ..hearing import ears
-from ..mospa.react import REACTIONS
 from ..nets.flow import GAZE, USER, Condition
 from ..nets.stream import DecoderStream, Stream, branches, combine, history_time, midpoint, reacting
 from . import common
@@ -215,10 +213,7 @@ def main():
                 place = windows.draw(args.teach)
                 history, cond = windows.batch(args.teach, place)
                 cond, eps = targets(cond, gaze), args.temperature * torch.randn_like(history)
-            guidance = args.guidance
-            if windows.sound_features:
-                share = ears.called(cond.sound, windows.sound_features, len(REACTIONS)) * cond.heard[..., 0]
-                guidance = reacting(guidance, share, args.reaction_guidance)
+            guidance = reacting(args.guidance, windows.called(cond), args.reaction_guidance)
             wish = teach(teacher, history, eps, calibrated(cond, args.gaze_map) if gaze else cond, gaze, guidance, args.gaze_guidance,
                          tau_history=args.tau_history, clean_from=args.clean_from)
             memory.add(place, history, eps, wish, cond, own)

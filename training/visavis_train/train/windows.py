@@ -3,7 +3,7 @@ import torch
 import torch.nn.functional as F
 
 from ..hearing import ears
-from ..motion import rig
+from ..mospa.react import REACTIONS
 from ..nets.flow import GAZE, USER, Condition
 from . import common
 from .common import mixed
@@ -11,7 +11,7 @@ from .data import Split
 from .geometry import to_local
 
 CONTEXT = 8  # frames that an audio encoder in training hears before a window: a quarter of a second, more than it looks back
-TURNS = 0.4  # rad/s of the heading: a body that turns, not one that sways
+ASIDE = 0.6  # rad off the heading: a user to whom a body turns
 SMOOTH = (1, 30, 60, 120)  # frames over which the gaze score is averaged; drawn as often as the window's mean
 
 
@@ -22,6 +22,12 @@ def smooth(gaze, window):
     left = window // 2
     padded = F.pad(gaze[None, None], (left, window - 1 - left), mode="replicate")
     return F.avg_pool1d(padded, window, 1)[0, 0]
+
+
+def aside(cond):
+    """Blocks [B, K] at whose start the user is seen more than ASIDE off the heading, 0 or 1."""
+    x, z = cond.user[..., -2:].unbind(-1)
+    return (torch.atan2(x, z).abs() > ASIDE).float() * cond.flags[..., USER]
 
 
 class Windows:
@@ -105,16 +111,11 @@ class Windows:
         """Share of each block's frames [B, K] in which both hands are still."""
         return self.still[self.frames(segment, at)[:, 4:]].float().unflatten(1, (self.blocks, 4)).mean(-1)
 
-    def reacting(self, segment, at):
-        """Share of each block's frames [B, K] in which the body reacts to a sound."""
+    def called(self, cond):
+        """How much what is heard in each block [B, K] calls for a reaction, 0 to 1."""
         if not self.sound_features:
-            return 0.0
-        return self.reacts[self.frames(segment, at)[:, 4:]].float().unflatten(1, (self.blocks, 4)).mean(-1)
-
-    def turning(self, segment, at):
-        """Blocks [B, K] in which the body turns at TURNS or faster, 0 or 1."""
-        yaw = self.roots[self.frames(segment, at)[:, 3::4], 2].diff(dim=1)
-        return rig.wrap(yaw).abs().ge(TURNS * 4 / 30).float()
+            return torch.zeros(cond.flags.shape[:2], device=self.device)
+        return ears.called(cond.sound, self.sound_features, len(REACTIONS)) * cond.heard[..., 0]
 
     def hear(self, segment, at):
         """Agent's and user's features [B, K, 4 D_a] each, straight from the voices."""
