@@ -98,6 +98,8 @@ def main():
     args = parser.parse_args()
     if (args.hearing is None) != (args.appraisal is None):
         raise SystemExit("--hearing and --appraisal belong together")
+    if args.student_temperature is not None and not args.student:
+        raise SystemExit("--student-temperature is a student's: give --student")
     if args.idle_frames % 4:
         raise SystemExit("--idle-frames must be a multiple of 4")
     if args.idle_from:

@@ -50,7 +50,7 @@ class Windows:
         self.weights = self.segments[:, 3].float()
         self.sound_features = state["sound"].shape[1] if "sound" in state else 0
         if self.sound_features:
-            for name in ("sound", "levels", "source", "known", "reacts", "hears", "sensitivity", "silence"):
+            for name in ("sound", "levels", "source", "known", "hears", "sensitivity", "silence"):
                 setattr(self, name, state[name].to(self.device))
             self.weights = self.weights * torch.where(state["hears"][self.segments[:, 0]], sounds, 1.0)
         spans = list(zip(self.starts[:-1].tolist(), self.starts[1:].tolist()))
