@@ -32,8 +32,8 @@ def small_flow():
                                     embed_voice=12, embed_gaze=4))
 
 
-def made_windows(tmp_path, blocks=16, clips=2, frames=160, latent=8, **kw):
-    """Windows of a cache of `clips` walks with random latents and features; the second voice is absent."""
+def made_windows(tmp_path, blocks=16, clips=2, frames=160, latent=8, names="talk", **kw):
+    """Windows of a cache of `clips` walks with random latents and features; the second voice is absent. `names`: the clips' kind."""
     p, q = walker(frames)
     roots = torch.from_numpy(data.compact(p, q)[1])
     rows, segments = [], []
@@ -44,7 +44,7 @@ def made_windows(tmp_path, blocks=16, clips=2, frames=160, latent=8, **kw):
             rows.append(torch.randn(n, latent))
     total = clips * frames
     path = str(tmp_path / "train.pt")
-    torch.save({"names": ["a"] * clips, "starts": torch.arange(clips + 1) * frames, "has": torch.tensor([[True, False]] * clips),
+    torch.save({"names": [f"{names}_{i}" for i in range(clips)], "starts": torch.arange(clips + 1) * frames, "has": torch.tensor([[True, False]] * clips),
                 "roots": roots.repeat(clips, 1), "user": torch.randn(total, 3) + 2, "gaze": torch.rand(total), "agent": torch.randn(total, 6).half(),
                 "voice": torch.randn(total, 6).half(), "still": torch.arange(total) % 8 < 4, "z": torch.cat(rows), "segments": torch.tensor(segments), "latent_mean": torch.zeros(latent),
                 "latent_std": torch.ones(latent)}, path)
@@ -172,6 +172,13 @@ def test_a_voice_that_a_clip_lacks_is_heard_to_be_silent_in_some_windows(tmp_pat
     w = made_windows(tmp_path, drop=0, drop_all=0, drop_gaze=0, prefix=0, quiet=0.4)
     agent, user = (torch.cat([w.batch(64)[1].flags[..., 1:3] for _ in range(8)])).unbind(-1)
     assert agent.all() and 0.3 < user.mean() < 0.5 and (user == user[:, :1]).all()
+
+
+@pytest.mark.parametrize("kind", ["pair", "walk"])
+def test_nobody_is_heard_to_be_silent_where_people_dance_or_wander(tmp_path, kind):
+    w = made_windows(tmp_path, names=kind, drop=0, drop_all=0, drop_gaze=0, prefix=0, quiet=1.0)
+    flags = w.batch(32)[1].flags
+    assert flags[..., 1].all() and not flags[..., 2].any()
 
 
 def test_a_user_who_is_away_is_not_seen_all_along_or_in_part(tmp_path):

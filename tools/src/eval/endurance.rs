@@ -22,9 +22,8 @@ const WALKS: usize = 4;
 /// would pass for drift.
 const GAZE: f32 = 0.8;
 
-/// Metrics of the last period of a long run against those of the first: the same voices and the
-/// same way of the user come again in each period and the gaze target is the same throughout, so
-/// that only the agent can change.
+/// Metrics of a long run period by period: the same voices and the same way of the user come again
+/// in each and the gaze target is the same throughout, so that only the agent can change.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Endurance {
     /// Length of a period, seconds.
@@ -48,16 +47,15 @@ pub struct Endurance {
     pub wandered: f64,
 }
 
-/// A metric in the first and in the last period.
+/// A metric from period to period.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Change {
     /// Its name.
     pub metric: &'static str,
-    /// In the first period.
-    pub first: f64,
-    /// In the last one.
-    pub last: f64,
-    /// Standard error of their difference, from how the runs differ; `None` of one run.
+    /// Its mean over the runs in each period, from the first on.
+    pub periods: Vec<f64>,
+    /// Standard error of the difference between the last and the first, from how the runs differ;
+    /// `None` of one run.
     pub error: Option<f64>,
     /// A difference up to this counts as none: a part of nearly nothing says nothing.
     pub least: f64,
@@ -77,14 +75,26 @@ const METRICS: [Metric; 7] = [
 ];
 
 impl Change {
-    /// The difference as a part of the first value.
-    pub fn part(&self) -> f64 {
-        (self.last - self.first).abs() / self.first.abs().max(1e-9)
+    /// The value in the first period; NaN where there is none.
+    pub fn first(&self) -> f64 {
+        self.periods.first().copied().unwrap_or(f64::NAN)
     }
 
-    /// Whether the last value is within `part` of the first, or differs by nearly nothing.
+    /// The value in the last period.
+    pub fn last(&self) -> f64 {
+        self.periods.last().copied().unwrap_or(f64::NAN)
+    }
+
+    /// The value that is furthest from the first one's.
+    pub fn furthest(&self) -> f64 {
+        let away = |v: &f64| (v - self.first()).abs();
+        self.periods.iter().copied().max_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(f64::NAN)
+    }
+
+    /// Whether the value stays within `part` of the first in every period, or differs by nearly
+    /// nothing.
     pub fn within(&self, part: f64) -> bool {
-        (self.last - self.first).abs() <= self.least.max(part * self.first.abs())
+        (self.furthest() - self.first()).abs() <= self.least.max(part * self.first().abs())
     }
 }
 
@@ -112,11 +122,12 @@ impl Endurance {
         let guard = GuardStats { trips, held_frames: held, ..GuardStats::default() };
         let frames = runs * periods * length;
         let metric = |(name, value, least): &Metric| {
-            let pairs: Vec<_> = results.iter().filter_map(|r| Some((value(&r.first)?, value(&r.last)?))).collect();
-            let differences: Vec<_> = pairs.iter().map(|(first, last)| last - first).collect();
-            let error = (pairs.len() > 1).then(|| libm::sqrt(mean_and_error2(&differences).1));
-            let (first, last) = (mean(pairs.iter().map(|p| p.0))?, mean(pairs.iter().map(|p| p.1))?);
-            Some(Change { metric: name, first, last, error, least: *least })
+            let of = |run: &Run| run.periods.iter().map(value).collect::<Option<Vec<_>>>();
+            let values: Vec<_> = results.iter().filter_map(of).collect();
+            let differences: Vec<_> = values.iter().map(|v| v[periods - 1] - v[0]).collect();
+            let error = (values.len() > 1).then(|| libm::sqrt(mean_and_error2(&differences).1));
+            let periods = (0..periods).map(|i| mean(values.iter().map(|v| v[i]))).collect::<Option<_>>()?;
+            Some(Change { metric: name, periods, error, least: *least })
         };
         Ok(Self {
             period,
@@ -133,8 +144,7 @@ impl Endurance {
 }
 
 struct Run {
-    first: Summary,
-    last: Summary,
+    periods: Vec<Summary>,
     finite: bool,
     guard: GuardStats,
     wandered: f64,
@@ -143,7 +153,6 @@ struct Run {
 impl Run {
     fn of(recording: &Recording, length: usize) -> Self {
         let frames = recording.frames.as_slice();
-        // The session's start, from the idle clip, belongs to no period.
         let part = |from: usize, to: usize| {
             let voice = |v: &Option<Vec<f32>>| v.as_ref().map(|v| v[from * FRAME_SAMPLES..to * FRAME_SAMPLES].to_vec());
             Summary::of(&Recording {
@@ -157,11 +166,12 @@ impl Run {
             })
         };
         let last = frames.len() - length;
+        // Each without its first seconds: the session's start, from the idle clip, belongs to none.
+        let periods = (0..frames.len() / length).map(|i| part(i * length + LEAD, (i + 1) * length)).collect();
         let finite = |f: &Frame| f.global.iter().all(|t| t.position.is_finite() && t.rotation.is_finite());
         let away = |f: &Frame| f.root.x.hypot(f.root.z);
         Self {
-            first: part(LEAD, length),
-            last: part(last + LEAD, frames.len()),
+            periods,
             finite: frames.iter().all(finite),
             guard: GuardStats::default(),
             wandered: frames[last..].iter().map(away).sum::<f64>() / length as f64,
@@ -249,4 +259,20 @@ fn walking(t: f32) -> Vec3 {
     let home = ((t - STAND - WALK - WAIT) / WALK).clamp(0.0, 1.0);
     let aside = 0.3 * (std::f32::consts::PI * out).sin() - 1.5 * (std::f32::consts::PI * home).sin();
     Vec3::new(aside, 1.65, 1.5 + 6.0 * (out - home))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_period_in_the_middle_counts_as_much_as_the_last() {
+        let of = |periods: &[f64]| Change { metric: "", periods: periods.to_vec(), error: None, least: 0.02 };
+        let dance = of(&[0.1, 0.4, 0.1]);
+        assert_eq!((dance.first(), dance.furthest(), dance.last()), (0.1, 0.4, 0.1));
+        assert!(!dance.within(0.15) && !of(&[1.0, 0.8, 0.9]).within(0.15));
+        assert!(of(&[1.0, 1.14, 0.9]).within(0.15), "within the part");
+        assert!(of(&[0.01, 0.02, 0.0]).within(0.15), "within the least");
+        assert!(!of(&[]).within(0.15), "nothing measured is not met");
+    }
 }

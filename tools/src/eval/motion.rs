@@ -22,11 +22,14 @@ pub(super) fn generate(
     // A path ends with its last point; the last frame has a length too.
     points.extend(points.last().map(|(_, p)| (at(points.len()), *p)));
     let count = points.len();
-    let mut path = (count > 0).then(|| UserPath::from_points(points)).transpose()?;
-    if let (Some(seen), Some(rotations)) = (path.take_if(|_| rotations.is_some()), rotations) {
-        let last = rotations.last().into_iter();
-        path = Some(seen.with_rotations(rotations.iter().chain(last).copied().take(count).collect())?);
-    }
+    let path = match rotations {
+        _ if count == 0 => None,
+        None => Some(UserPath::from_points(points)?),
+        Some(all) => {
+            let turned = all.iter().chain(all.last()).copied().take(count).collect();
+            Some(UserPath::from_points(points)?.with_rotations(turned)?)
+        }
+    };
     let talk = Conversation::new(agent, user, path)?;
     run(&mut engine.session(options)?, &talk, &mut |_| {})
 }

@@ -182,9 +182,11 @@ impl Report {
         }
         if let Some(e) = &self.endurance {
             for c in &e.changes {
-                let part = |v: f64| 100.0 * v / c.first;
+                let part = |v: f64| 100.0 * v / c.first();
                 let error = c.error.map_or(String::new(), |e| format!(", standard error {:.0} %", part(e)));
-                let text = format!("{:.4} to {:.4} ({:+.0} %{error})", c.first, c.last, part(c.last - c.first));
+                let change = part(c.last() - c.first());
+                let each: Vec<_> = c.periods.iter().map(|v| format!("{v:.4}")).collect();
+                let text = format!("{} ({change:+.0} %{error})", each.join(" "));
                 row(&format!("endurance, {}", c.metric), text);
             }
             let text = format!("{} runs of {} x {} s, {:.1} m from the start", e.runs, e.periods, e.period, e.wandered);

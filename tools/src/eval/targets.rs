@@ -151,11 +151,11 @@ fn reaction(r: &Reaction) -> Vec<Verdict> {
 fn endurance(e: &Endurance) -> Vec<Verdict> {
     let within = e.changes.iter().all(|c| c.within(0.15));
     let worst: Vec<_> = e.changes.iter().filter(|c| !c.within(0.15)).map(|c| c.metric).collect();
-    let minutes = e.period * e.periods;
-    let bones = e.changes.iter().find(|c| c.metric == "bone deviation").map(|c| c.first.max(c.last));
+    let seconds = e.period * e.periods;
+    let bones = e.changes.iter().find(|c| c.metric == "bone deviation").map(|c| c.first().max(c.furthest()));
     vec![
         verdict(
-            &format!("endurance, {minutes} s: last {} s against the first", e.period),
+            &format!("endurance, {seconds} s: every {} s against the first", e.period),
             "every metric within 15 %".into(),
             if within { "all within".into() } else { format!("not {}", worst.join(", ")) },
             Some(within),

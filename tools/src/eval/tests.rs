@@ -115,6 +115,7 @@ fn a_bundle_that_trips_the_guard_is_defective() {
         (report.endurance.unwrap(), verdict)
     };
     let (sound, verdict) = endurance(0.25);
+    assert!(sound.changes.iter().all(|c| c.periods.len() == sound.periods), "{:?}", sound.changes);
     assert!(!sound.defective && verdict.met == Some(true), "{verdict:?}");
     let (wild, verdict) = endurance(100.0);
     assert!(wild.defective && wild.held > 0.5 && verdict.met == Some(false), "{verdict:?}");

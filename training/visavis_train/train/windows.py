@@ -11,6 +11,7 @@ from .data import Split
 from .geometry import to_local
 
 CONTEXT = 8  # frames that an audio encoder in training hears before a window: a quarter of a second, more than it looks back
+LOOSE = ("pair", "walk")  # kinds of clips, by their names, whose people dance or wander, whoever is silent
 ASIDE = 0.6  # rad off the heading: a user to whom a body turns
 SMOOTH = (1, 30, 60, 120)  # frames over which the gaze score is averaged; drawn as often as the window's mean
 
@@ -36,7 +37,8 @@ class Windows:
 
     def __init__(self, cache, blocks, drop=0.05, drop_all=0.1, drop_gaze=0.35, prefix=0.1, jitter=True, device="cpu", audio=None, voices=None, live=None, sounds=1.0, away=0.0, quiet=0.0):
         """`sounds`: how much more often clips in which sounds are heard are drawn than their length says; `away`: share of windows in which the user is
-        not seen, all along or until or from some block; `quiet`: share of windows of clips that lack a voice in which it is heard to be silent."""
+        not seen, all along or until or from some block; `quiet`: share of windows of clips that lack a voice in which it is heard to be silent, but of people who dance or
+        wander: silence would be taken for a call to dance."""
         state = common.load(cache, mmap=True)
         self.blocks, self.device = blocks, torch.device(device)
         self.drop, self.drop_all, self.drop_gaze, self.prefix, self.jitter = drop, drop_all, drop_gaze, prefix, jitter
@@ -48,6 +50,7 @@ class Windows:
         if not len(self.segments):
             raise SystemExit(f"{cache} has no clip of {blocks} blocks ({blocks * 4 / 30:.1f} s)")
         self.weights = self.segments[:, 3].float()
+        self.composed = torch.tensor([not name.startswith(LOOSE) for name in state["names"]])
         self.sound_features = state["sound"].shape[1] if "sound" in state else 0
         if self.sound_features:
             for name in ("sound", "levels", "source", "known", "hears", "sensitivity", "silence"):
@@ -80,7 +83,8 @@ class Windows:
         kind = kind.to(self.device)[:, None]
         gaze = torch.where(kind >= len(SMOOTH), self.gaze[0][now].mean(1, keepdim=True), self.gaze[kind % len(SMOOTH), now])
         flags = torch.ones(b, n, 4, device=self.device)
-        has = torch.maximum(self.has[segment[:, 0]], (torch.rand(b, 2) < self.quiet).float()) if self.quiet else self.has[segment[:, 0]]
+        silent = (torch.rand(b, 2) < self.quiet) & self.composed[segment[:, 0], None]
+        has = torch.maximum(self.has[segment[:, 0]], silent.float())
         flags[..., 1:3] = has.to(self.device)[:, None]
         room = self.room(segment, frames, self.roots[before[:, 3::4]]) if self.sound_features else ()
         together = lambda x: x.float().reshape(b, n, -1)
