@@ -5,10 +5,7 @@ use visavis::{Engine, Error, ErrorKind, Result};
 use visavis_tools::offline::{Conversation, Sound};
 use visavis_tools::room;
 
-/// The shipped bundles; the first that is there is the default.
-const MODELS: [&str; 2] = [ROOM_MODEL, "models/visavis-base.safetensors"];
-
-/// The shipped bundle with hearing.
+/// The shipped bundle, which has hearing.
 const ROOM_MODEL: &str = "models/visavis-room-i8.safetensors";
 
 /// The shipped bundle of the kind mospa.
@@ -16,14 +13,7 @@ const CLIP_MODEL: &str = "models/visavis-mospa-i8.safetensors";
 
 /// The bundle to use: `given`, else the shipped one.
 pub fn model(given: Option<&Path>) -> Result<PathBuf> {
-    match given {
-        Some(path) => Ok(path.to_path_buf()),
-        None => {
-            let found = MODELS.iter().find_map(|model| shipped(model).ok());
-            let tried = || MODELS.iter().filter_map(|model| shipped(model).err()).flatten().collect::<Vec<_>>();
-            found.ok_or_else(|| missing("the model", &tried(), "; or name a bundle with --model"))
-        }
-    }
+    given_or_shipped(given, ROOM_MODEL, "the model", "; or name a bundle with --model")
 }
 
 /// The bundle with hearing to use: `given`, else the shipped one.

@@ -38,7 +38,7 @@ fn the_shipped_model_hides_its_switches() {
     let file = |name: &str| format!("{}/../{name}", env!("CARGO_MANIFEST_DIR"));
     let voice = |name: &str| Wav::parse(&std::fs::read(file(name)).unwrap()).unwrap().to_24k().unwrap();
     let voices = Voices::new(voice("samples/agent.wav").to_vec(), voice("samples/user.wav").to_vec()).unwrap();
-    let engine = Engine::load(file("models/visavis-base.safetensors")).unwrap();
+    let engine = Engine::load(file("models/visavis-room-i8.safetensors")).unwrap();
     let seam = switches::measure(&engine, &voices, 40).unwrap().unwrap();
     assert!(seam > 0.3 && seam <= judge::SWITCH_SEAM, "seam metric {seam} where the sampler changes");
 }
