@@ -149,10 +149,11 @@ fn reaction(r: &Reaction) -> Vec<Verdict> {
 }
 
 fn endurance(e: &Endurance) -> Vec<Verdict> {
-    let within = e.changes.iter().all(|c| c.within(0.15));
     let worst: Vec<_> = e.changes.iter().filter(|c| !c.within(0.15)).map(|c| c.metric).collect();
+    let within = worst.is_empty();
     let seconds = e.period * e.periods;
-    let bones = e.changes.iter().find(|c| c.metric == "bone deviation").map(|c| c.first().max(c.furthest()));
+    let bones = e.changes.iter().find(|c| c.metric == "bone deviation");
+    let bones = bones.and_then(|c| c.periods.iter().copied().reduce(f64::max));
     vec![
         verdict(
             &format!("endurance, {seconds} s: every {} s against the first", e.period),
