@@ -84,6 +84,10 @@ pub struct Config {
     /// Hearing of sounds in the room, of the kind `sarah`; none: sounds are not heard.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hearing: Option<HearingConfig>,
+    /// What the networks of the kind `sarah` are told of how active the body is at rest; none:
+    /// nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rest: Option<RestConfig>,
     /// Predictors of the kind `dram`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dram: Option<DramConfig>,
@@ -280,6 +284,10 @@ pub struct SessionConfig {
     /// own flow time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub clean_history: Option<CleanHistory>,
+    /// Evaluations at this flow time and later are conditional alone, one branch instead of two or
+    /// three; absent: all are guided.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub guided_until: Option<f32>,
     /// Time constant with which the difference at a border between blocks dies away, frames; 0
     /// leaves borders as decoded.
     #[serde(default = "bridge")]
@@ -298,6 +306,7 @@ impl SessionConfig {
             gaze_guidance: 1.0,
             temperature: 1.0,
             clean_history: None,
+            guided_until: None,
             bridge,
             anchor_period: 0,
             anchor_radius: 1.0,
@@ -309,12 +318,12 @@ impl SessionConfig {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GazeConfig {
     /// The reference network with gaze guidance.
-    pub guided: GazeCurve,
+    pub guided: ResponseCurve,
     /// The reference network with the channel as one condition among others.
-    pub unguided: GazeCurve,
+    pub unguided: ResponseCurve,
     /// The single-step student, when the bundle holds one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub student: Option<GazeCurve>,
+    pub student: Option<ResponseCurve>,
     /// Mean gaze scores of stretches of recorded conversations at evenly spaced quantiles from the
     /// least to the largest: what free gaze is drawn from.
     pub levels: Vec<f32>,
@@ -324,20 +333,50 @@ pub struct GazeConfig {
 
 impl GazeConfig {
     /// The curves that there are, by name.
-    pub fn curves(&self) -> impl Iterator<Item = (&'static str, &GazeCurve)> {
+    pub fn curves(&self) -> impl Iterator<Item = (&'static str, &ResponseCurve)> {
         let student = self.student.iter().map(|curve| ("student", curve));
         [("guided", &self.guided), ("unguided", &self.unguided)].into_iter().chain(student)
     }
 }
 
-/// Pairs of a mean gaze score and the channel's value that brings it about, both ascending; linear
-/// between, constant beyond.
+/// Values of the activity of a body at rest: the share of time in which its hands are not still, the
+/// speed of the hands, that of the head; each about -1 to 1.
+pub const ACTIVITY: usize = 3;
+
+/// How active the body is at rest, and the networks' way in for it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RestConfig {
+    /// Hidden width of what embeds the activity.
+    pub embed: usize,
+    /// Activity of stretches of real people at rest: what a body at rest draws from.
+    pub levels: Vec<[f32; ACTIVITY]>,
+    /// Length of such a stretch, seconds.
+    pub seconds: f32,
+    /// What the reference network must be told, value by value, to be as active, as `visavis
+    /// calibrate` measured it; none: what is wanted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<[ResponseCurve; ACTIVITY]>,
+    /// The same of the student.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub student: Option<[ResponseCurve; ACTIVITY]>,
+}
+
+impl RestConfig {
+    /// The curves that there are, by name.
+    pub fn curves(&self) -> impl Iterator<Item = (&'static str, &ResponseCurve)> {
+        let both = [("reference", &self.reference), ("student", &self.student)];
+        both.into_iter().flat_map(|(name, curves)| curves.iter().flatten().map(move |curve| (name, curve)))
+    }
+}
+
+/// Pairs of what a network does (a mean gaze score, an activity) and the channel's value that brings
+/// it about, both ascending; linear between, constant beyond.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct GazeCurve(pub Vec<[f32; 2]>);
+pub struct ResponseCurve(pub Vec<[f32; 2]>);
 
-impl GazeCurve {
-    /// The channel's value for a wanted mean gaze score.
+impl ResponseCurve {
+    /// The channel's value for a wanted response.
     pub fn channel(&self, score: f32) -> f32 {
         let above = self.0.partition_point(|[s, _]| *s < score);
         match (above.checked_sub(1).map(|i| self.0[i]), self.0.get(above)) {

@@ -5,7 +5,7 @@ mod common;
 
 use common::{Inputs, golden_path, run, tiny};
 use std::sync::Arc;
-use visavis::internals::config::{Config, GazeConfig, GazeCurve};
+use visavis::internals::config::{Config, GazeConfig, ResponseCurve};
 use visavis::internals::session::{Diagnostics, GazeControl};
 use visavis::{BundleFile, Engine, ErrorKind, Frame, Sampler, SessionOptions};
 
@@ -13,9 +13,9 @@ const BLOCKS: usize = 12;
 
 fn gaze() -> GazeConfig {
     GazeConfig {
-        guided: GazeCurve(vec![[0.0, -0.5], [1.0, 0.5]]),
-        unguided: GazeCurve(vec![[0.0, -0.8], [1.0, 0.8]]),
-        student: Some(GazeCurve(vec![[0.0, 0.25], [1.0, 0.75]])),
+        guided: ResponseCurve(vec![[0.0, -0.5], [1.0, 0.5]]),
+        unguided: ResponseCurve(vec![[0.0, -0.8], [1.0, 0.8]]),
+        student: Some(ResponseCurve(vec![[0.0, 0.25], [1.0, 0.75]])),
         levels: vec![0.25],
         seconds: 10.0,
     }
@@ -77,10 +77,10 @@ fn unguided_is_neither_guided_nor_absent() {
 #[test]
 fn a_calibration_that_makes_no_sense_is_refused() {
     let bad = [
-        GazeConfig { guided: GazeCurve(vec![]), ..gaze() },
-        GazeConfig { guided: GazeCurve(vec![[0.5, 0.0], [0.5, 1.0]]), ..gaze() },
-        GazeConfig { student: Some(GazeCurve(vec![[0.1, 0.3], [0.5, 0.1]])), ..gaze() },
-        GazeConfig { unguided: GazeCurve(vec![[0.1, 7.0]]), ..gaze() },
+        GazeConfig { guided: ResponseCurve(vec![]), ..gaze() },
+        GazeConfig { guided: ResponseCurve(vec![[0.5, 0.0], [0.5, 1.0]]), ..gaze() },
+        GazeConfig { student: Some(ResponseCurve(vec![[0.1, 0.3], [0.5, 0.1]])), ..gaze() },
+        GazeConfig { unguided: ResponseCurve(vec![[0.1, 7.0]]), ..gaze() },
         GazeConfig { levels: vec![], ..gaze() },
         GazeConfig { levels: vec![f32::NAN], ..gaze() },
         GazeConfig { seconds: 0.0, ..gaze() },

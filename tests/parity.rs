@@ -150,6 +150,29 @@ fn hearing_equals_pytorch() {
     assert!(error < TOLERANCE, "the student differs by {error}");
 }
 
+/// A bundle that is told how active the body is at rest, and whose late evaluations are conditional
+/// alone. The agent speaks at first, the user stands.
+#[test]
+fn rest_equals_pytorch() {
+    let engine = Engine::load(common::golden_path("rest.safetensors")).expect("the tiny bundle with rest loads");
+    let golden = Golden::named("rest.out.safetensors");
+    let rests = golden.values("rests");
+    assert!(rests.contains(&0.0) && rests.contains(&1.0), "the golden file has both");
+    for (sampler, name) in [
+        (Sampler::Midpoint4, "latents"),
+        (Sampler::Midpoint2, "latents.midpoint2"),
+        (Sampler::Midpoint1, "latents.midpoint1"),
+        (Sampler::Single, "student"),
+    ] {
+        let ours = stages_of(&engine, &golden, sampler, Diagnostics { cache: KvDtype::F32, ..Default::default() });
+        let told = ours["conditioning.activity"].len() / 3;
+        assert_eq!(told, rests.iter().filter(|rests| **rests > 0.0).count(), "{sampler}: blocks at rest");
+        let error = max_error(&ours["latents"], &golden.values(name));
+        println!("{sampler}: {error:e}");
+        assert!(error < TOLERANCE, "{sampler} differs by {error}");
+    }
+}
+
 #[test]
 fn cheaper_samplers_equal_pytorch() {
     let golden = Golden::load();

@@ -7,7 +7,7 @@ use common::{Inputs, golden_path, hearing, hearing_bytes, hearing_f32, motion_of
 use safetensors::SafeTensors;
 use std::sync::Arc;
 use visavis::internals::bundle::{TensorInfo, int16_activations};
-use visavis::internals::config::{Config, GazeConfig, GazeCurve};
+use visavis::internals::config::{Config, GazeConfig, ResponseCurve};
 use visavis::internals::kernels::{Kernels, Scheme};
 use visavis::internals::quant::{Budget, Keep, Options, Scene, Sound, Teacher, quantise};
 use visavis::internals::session::{Anchoring, Diagnostics, GazeControl};
@@ -25,9 +25,9 @@ fn infos(file: &BundleFile<'_>) -> Vec<TensorInfo> {
 /// The tiny bundle with a calibration of gaze, whose free levels change every second or so.
 fn with_gaze() -> Arc<Engine> {
     let gaze = GazeConfig {
-        guided: GazeCurve(vec![[0.0, -0.5], [1.0, 0.5]]),
-        unguided: GazeCurve(vec![[-1.0, -0.8], [1.0, 0.8]]),
-        student: Some(GazeCurve(vec![[-1.0, -0.25], [1.0, 0.75]])),
+        guided: ResponseCurve(vec![[0.0, -0.5], [1.0, 0.5]]),
+        unguided: ResponseCurve(vec![[-1.0, -0.8], [1.0, 0.8]]),
+        student: Some(ResponseCurve(vec![[-1.0, -0.25], [1.0, 0.75]])),
         levels: vec![-0.3, 0.2, 0.9],
         seconds: 1.0,
     };

@@ -8,7 +8,8 @@
 use super::invalid;
 use crate::audio::check_audio_config;
 use crate::config::{
-    AudioConfig, Config, DramConfig, GazeConfig, GazeCurve, HearingConfig, Kind, LstmConfig, MospaConfig, TcnConfig,
+    AudioConfig, Config, DramConfig, GazeConfig, HearingConfig, Kind, LstmConfig, MospaConfig, ResponseCurve,
+    RestConfig, TcnConfig,
 };
 use crate::error::Result;
 use crate::frame::feature_count;
@@ -115,6 +116,7 @@ fn sarah(c: &Config) -> Result<()> {
     real("session.guidance", c.session.guidance, 0.0, 20.0)?;
     real("session.gaze_guidance", c.session.gaze_guidance, 0.0, 20.0)?;
     real("session.temperature", c.session.temperature, 0.0, 2.0)?;
+    real("session.guided_until", c.session.guided_until.unwrap_or(1.0), 0.0, 1.0)?;
     if let Some(h) = &c.session.clean_history {
         real("session.clean_history.tau", h.tau, 0.0, 1.0)?;
         real("session.clean_history.from", h.from, 0.0, 1.0)?;
@@ -123,6 +125,9 @@ fn sarah(c: &Config) -> Result<()> {
     real("session.anchor_radius", c.session.anchor_radius, 0.1, 1e6)?;
     if let Some(g) = &c.gaze {
         gaze(g)?;
+    }
+    if let Some(r) = &c.rest {
+        rest(r)?;
     }
     if let Some(h) = &c.hearing {
         within("hearing.audio.layers", h.audio.layers.len(), 1, 32)?;
@@ -160,20 +165,31 @@ fn dram(c: &Config, dram: &DramConfig) -> Result<()> {
 
 /// Checks what was measured of the gaze channel.
 fn gaze(g: &GazeConfig) -> Result<()> {
-    for (name, GazeCurve(points)) in g.curves() {
-        within(&format!("gaze.{name}"), points.len(), 1, 64)?;
-        for value in points.as_flattened() {
-            real(&format!("gaze.{name}"), *value, -1.0, 1.0)?;
-        }
-        if points.windows(2).any(|pair| pair[1][0] <= pair[0][0] || pair[1][1] <= pair[0][1]) {
-            return Err(invalid(format!("gaze.{name}: scores and channel values must both ascend")));
-        }
-    }
+    g.curves().try_for_each(|(name, response)| curve(&format!("gaze.{name}"), response, 1.0))?;
     within("gaze.levels", g.levels.len(), 1, 1024)?;
     for level in &g.levels {
         real("gaze.levels", *level, -1.0, 1.0)?;
     }
     real("gaze.seconds", g.seconds, 0.1, 3600.0)
+}
+
+/// Checks a curve of a channel, on both sides of which values lie within `most` of 0.
+fn curve(name: &str, ResponseCurve(points): &ResponseCurve, most: f32) -> Result<()> {
+    within(name, points.len(), 1, 64)?;
+    points.as_flattened().iter().try_for_each(|value| real(name, *value, -most, most))?;
+    if points.windows(2).any(|pair| pair[1][0] <= pair[0][0] || pair[1][1] <= pair[0][1]) {
+        return Err(invalid(format!("{name}: responses and channel values must both ascend")));
+    }
+    Ok(())
+}
+
+/// Checks what the networks are told at rest.
+fn rest(r: &RestConfig) -> Result<()> {
+    within("rest.embed", r.embed, 1, 4096)?;
+    real("rest.seconds", r.seconds, 0.1, 3600.0)?;
+    within("rest.levels", r.levels.len(), 1, 4096)?;
+    r.levels.as_flattened().iter().try_for_each(|value| real("rest.levels", *value, -4.0, 4.0))?;
+    r.curves().try_for_each(|(name, response)| curve(&format!("rest.{name}"), response, 4.0))
 }
 
 /// Bytes that a session takes at most, caches in f32; slots of their own that Euler samplers ask
@@ -186,7 +202,7 @@ fn session_bytes(c: &Config) -> u128 {
     let flow = product(&[2, 25, w.layers, w.window_blocks + 8, w.width]);
     // Encoder, two decoders; six tokens per block.
     let vae = product(&[2, 3, v.layers, 6 * v.window_blocks, v.width]);
-    let tokens = product(&[w.window_blocks + 9, 2 * v.latent + 8 + 8 * c.audio.features + 2 * w.width]);
+    let tokens = product(&[w.window_blocks + 9, 2 * v.latent + 8 + 8 * c.audio.features + 3 * w.width]);
     let anchor = product(&[w.window_blocks + 1, BLOCK_FRAMES * features + v.latent]);
     let rows = product(&[27, w.width, 12 + w.mlp]) + product(&[6, v.width, 12 + v.mlp]);
     let modulation = product(&[9, 2, 6 * w.layers + 2, w.width]);

@@ -89,6 +89,7 @@ impl From<DramBundle> for Config {
             flow: FlowConfig::default(),
             student: None,
             hearing: None,
+            rest: None,
             dram: Some(dram),
             mospa: None,
             session,

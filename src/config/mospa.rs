@@ -60,6 +60,7 @@ impl From<MospaBundle> for Config {
             flow: FlowConfig::default(),
             student: None,
             hearing: None,
+            rest: None,
             dram: None,
             mospa: Some(mospa),
             session,

@@ -5,7 +5,7 @@ use crate::bundle::{IDLE_FRAMES, IDLE_LATENTS, Tensors};
 use crate::config::Config;
 use crate::dram::Dram;
 use crate::error::{Error, ErrorKind, Result};
-use crate::flow::{ConditionLayout, FlowNet, Nets, reference_times, student_times};
+use crate::flow::{ConditionLayout, FlowNet, Nets, flow_times, reference_slots, student_slots};
 use crate::frame::{BLOCK_FRAMES, Sampler, feature_count};
 use crate::kernels::{Exec, Kernels, KvDtype};
 use crate::normaliser::{Metric, Normaliser, Standardised};
@@ -65,10 +65,11 @@ impl Sarah {
             FlowNet::load(t, kernels, config, layout, prefix, times).map(Some)
         };
         // Tensors of a student that the config does not have are not skipped: they are an error.
-        let student = config.student.map(|s| net("student", networks.student, student_times(s.tau_history)));
+        let student =
+            config.student.map(|s| net("student", networks.student, flow_times(&student_slots(s.tau_history))));
         let student = student.transpose()?.flatten();
-        let flow_times = reference_times(Sampler::Midpoint4, config.session.clean_history);
-        let flow = net("flow", networks.reference, flow_times)?;
+        let slots = reference_slots(Sampler::Midpoint4, config.session.clean_history, None);
+        let flow = net("flow", networks.reference, flow_times(&slots))?;
         let encoder = match idle {
             Idle::Latents(_) if !networks.encoder => {
                 t.skip("vae.encoder.");

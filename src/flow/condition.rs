@@ -1,6 +1,6 @@
 //! What a token is told.
 
-use crate::config::{Config, HearingConfig};
+use crate::config::{ACTIVITY, Config, HearingConfig};
 
 /// Where each modality lies in a [`Condition`]'s values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -9,6 +9,8 @@ pub struct ConditionLayout {
     pub audio_features: usize,
     /// Length of the sound vector; 0 of a bundle without hearing.
     pub sound: usize,
+    /// Values of the activity at rest; 0 of a bundle that is told of none.
+    pub activity: usize,
 }
 
 impl ConditionLayout {
@@ -18,13 +20,14 @@ impl ConditionLayout {
     /// That of a bundle.
     pub fn of(config: &Config) -> Self {
         let sound = config.hearing.as_ref().map_or(0, HearingConfig::width);
-        Self { audio_features: config.audio.features, sound }
+        let activity = config.rest.as_ref().map_or(0, |_| ACTIVITY);
+        Self { audio_features: config.audio.features, sound, activity }
     }
 
     /// Number of values: 4 x 2 user positions, 4 frames of features of each voice, 4 gaze scores,
-    /// the sound vector.
+    /// the sound vector, the activity at rest.
     pub fn width(&self) -> usize {
-        self.gaze().end + self.sound
+        self.activity().end
     }
 
     pub(super) fn user(&self) -> std::ops::Range<usize> {
@@ -46,7 +49,12 @@ impl ConditionLayout {
     }
 
     pub(super) fn sound(&self) -> std::ops::Range<usize> {
-        self.gaze().end..self.width()
+        self.gaze().end..self.gaze().end + self.sound
+    }
+
+    pub(super) fn activity(&self) -> std::ops::Range<usize> {
+        let start = self.sound().end;
+        start..start + self.activity
     }
 }
 
@@ -62,6 +70,8 @@ pub struct Condition {
     pub(super) present: [bool; 4],
     /// Whether sounds in the room are listened to.
     pub(super) hears: bool,
+    /// Whether the body is at rest and its activity is told.
+    pub(super) rests: bool,
     /// Whether the gaze target is guided towards, by a branch of its own.
     pub(super) guided: bool,
 }
@@ -69,12 +79,19 @@ pub struct Condition {
 impl Condition {
     /// Everything absent.
     pub fn absent(layout: ConditionLayout) -> Self {
-        Self { layout, values: vec![0.0; layout.width()], present: [false; 4], hears: false, guided: false }
+        Self {
+            layout,
+            values: vec![0.0; layout.width()],
+            present: [false; 4],
+            hears: false,
+            rests: false,
+            guided: false,
+        }
     }
 
     /// Makes everything absent again.
     pub fn clear(&mut self) {
-        (self.present, self.hears, self.guided) = ([false; 4], false, false);
+        (self.present, self.hears, self.rests, self.guided) = ([false; 4], false, false, false);
     }
 
     /// The user's floor positions `(x, z)` over four frames in the agent's frame, metres.
@@ -109,6 +126,13 @@ impl Condition {
         self.hears = true;
     }
 
+    /// How active the body is, which is at rest; of a bundle that is told of it. Part of every
+    /// guidance branch: guidance is towards what is heard and seen.
+    pub fn set_activity(&mut self, level: &[f32; ACTIVITY]) {
+        self.values[self.layout.activity()].copy_from_slice(level);
+        self.rests = true;
+    }
+
     /// Whether a gaze target is guided towards, so that the reference network has a third branch to
     /// run.
     pub fn guides_gaze(&self) -> bool {
@@ -118,7 +142,7 @@ impl Condition {
     pub(super) fn copy_from(&mut self, other: &Self) {
         debug_assert_eq!(self.layout, other.layout);
         self.values.copy_from_slice(&other.values);
-        (self.present, self.hears, self.guided) = (other.present, other.hears, other.guided);
+        (self.present, self.hears, self.rests, self.guided) = (other.present, other.hears, other.rests, other.guided);
     }
 
     pub(super) fn layout(&self) -> ConditionLayout {

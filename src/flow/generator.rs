@@ -6,8 +6,8 @@ use super::making::Making;
 use super::nets::{Guidance, Nets};
 use super::network::FlowNet;
 use super::pass::Tools;
-use super::schedule::{Schedule, reference_times, student_times};
-use super::slots::{Branches, CHUNK, Slots};
+use super::schedule::{Branches, Schedule, reference_slots, student_slots};
+use super::slots::{CHUNK, Slots};
 use super::upkeep::Stretch;
 use crate::config::CleanHistory;
 use crate::error::Result;
@@ -26,6 +26,9 @@ pub struct GeneratorOptions {
     /// Whether late evaluations of the reference network see history nearly clean; `None` imputes
     /// it throughout.
     pub clean_history: Option<CleanHistory>,
+    /// Flow time from which evaluations of the reference network are conditional alone; `None`
+    /// guides all.
+    pub guided_until: Option<f32>,
 }
 
 /// The history of one session, and the caches of the reference network and its student over it.
@@ -52,13 +55,13 @@ impl Generator {
     /// # Panics
     /// Without any network.
     pub fn new(exec: &mut Exec, nets: Nets<'_>, condition: &Condition, options: GeneratorOptions) -> Result<Self> {
-        let GeneratorOptions { sampler, dtype, clean_history } = options;
+        let GeneratorOptions { sampler, dtype, clean_history, guided_until } = options;
         let any = nets.any();
         let (latent, window) = (any.latent(), any.config().window_blocks);
-        let mut slots = |net, times: &[f32], branches| Slots::new(exec, net, times, branches, dtype);
-        let reference = |net| slots(net, &reference_times(sampler, clean_history), Branches::Guided);
+        let mut slots = |net, times: &[_]| Slots::new(exec, net, times, dtype);
+        let reference = |net| slots(net, &reference_slots(sampler, clean_history, guided_until));
         let reference = nets.reference.map(reference).transpose()?;
-        let student = nets.student.map(|(net, tau)| slots(net, &student_times(tau), Branches::Baked)).transpose()?;
+        let student = nets.student.map(|(net, tau)| slots(net, &student_slots(tau))).transpose()?;
         Ok(Self {
             history: History::new(window + CHUNK as usize + 1, latent, condition.layout()),
             reference,
@@ -175,6 +178,12 @@ impl Generator {
             Some(slot) => (&self.student, slot),
         };
         slots.as_ref().map_or(0, |slots| slots.behind(slot, self.history.len()))
+    }
+
+    /// Whether slot `slot` has guidance branches.
+    pub fn guides(&self, slot: usize) -> bool {
+        let slots = self.reference.as_ref().filter(|slots| slot < slots.count());
+        slots.is_some_and(|slots| slots.branches(slot) == Branches::Guided)
     }
 
     /// Brings the slot of `sampler` that is furthest behind nearer to the present by one pass.

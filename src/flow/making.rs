@@ -56,7 +56,7 @@ impl Making {
     /// Euler: `z += v(z, tau) / steps`.
     pub(super) fn step(&mut self, i: usize, x1: &[f32]) {
         if self.sampler == Sampler::Single {
-            return self.z.copy_from_slice(x1);
+            return self.z.copy_from_slice(&x1[..self.x1.len()]);
         }
         let g = self.guidance;
         let latent = self.x1.len();

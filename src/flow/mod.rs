@@ -49,5 +49,5 @@ pub use network::FlowNet;
 pub use noise::{normal, uniform};
 pub use pass::{SHARED_ROWS, Tools, Work};
 pub use sampling::sample;
-pub use schedule::{reference_times, student_times};
+pub use schedule::{flow_times, reference_slots, student_slots};
 pub use upkeep::Stretch;

@@ -28,6 +28,8 @@ pub struct FlowNet {
     embed_user_voice: Matrix,
     embed_gaze: Matrix,
     sound: Option<Sound>,
+    /// The way in of the activity at rest.
+    activity: Option<(Matrix, Matrix)>,
     layers: Vec<Layer>,
     out: Matrix,
     rope: Rope,
@@ -67,6 +69,9 @@ impl FlowNet {
                 input: t.weights(&input, d, &[e + 1])?.pack(kernels, &input, None),
             })
         };
+        let activity = |e: usize| -> Result<_> {
+            Ok((linear("embed_activity.0", e, layout.activity)?, linear("embed_activity.2", d, e)?))
+        };
         let layer = |i: usize| -> Result<Layer> {
             let linear = |part: &str, outputs, inputs| linear(&format!("layers.{i}.{part}"), outputs, inputs);
             Ok(Layer {
@@ -103,6 +108,7 @@ impl FlowNet {
             embed_user_voice: linear("embed_voice", c.embed_voice, 4 * layout.audio_features)?,
             embed_gaze: linear("embed_gaze", c.embed_gaze, 4)?,
             sound: config.hearing.as_ref().map(|h| sound(h.embed)).transpose()?,
+            activity: config.rest.as_ref().map(|rest| activity(rest.embed)).transpose()?,
             layers: (0..c.layers).map(layer).collect::<Result<_>>()?,
             out: linear("final.out", latent, d)?,
             rope: Rope::new(d / c.heads),
@@ -138,7 +144,9 @@ impl FlowNet {
     pub fn condition_bytes(&self) -> usize {
         let embeds = [&self.embed_user.0, &self.embed_user.1, &self.embed_agent_voice, &self.embed_user_voice];
         let sound = self.sound.iter().flat_map(|s| [&s.embed.0, &s.embed.1, &s.input]);
-        embeds.into_iter().chain([&self.embed_gaze, &self.input_rest]).chain(sound).map(Matrix::bytes).sum()
+        let activity = self.activity.iter().flat_map(|(hidden, out)| [hidden, out]);
+        let both = [&self.embed_gaze, &self.input_rest];
+        embeds.into_iter().chain(both).chain(sound).chain(activity).map(Matrix::bytes).sum()
     }
 
     /// Bytes of what flow times are turned into modulation with, read when a session starts: packed
@@ -166,12 +174,8 @@ impl FlowNet {
     pub(super) fn scratch(&self) -> usize {
         // An embedding's hidden layer, itself and a one, and what it adds to the input.
         let sound = self.sound.as_ref().map_or(0, |s| 2 * s.input.in_features() + self.config.width);
-        sound.max(2 * self.rest_width())
-    }
-
-    /// The input of a token with everything absent, without the latent's part: `[d]`.
-    pub(super) fn unconditional(&self) -> &[f32] {
-        &self.unconditional
+        let activity = self.activity.as_ref().map_or(0, |(hidden, _)| hidden.out_features() + self.config.width);
+        sound.max(2 * self.rest_width()).max(activity)
     }
 
     /// Input of the latents: `y += W z` for `rows` rows of `[latent]`.
@@ -179,9 +183,9 @@ impl FlowNet {
         exec.linear(&self.input_latent, z, rows, y, Epilogue::Store);
     }
 
-    /// Input of a token's conditioning, `out` `[2, d]`: without a guided gaze target, and with it
-    /// (the same if there is none, or if it is not guided towards). `scratch` has
-    /// [`FlowNet::scratch`] floats.
+    /// Input of a token's conditioning, `out` `[INPUTS, d]`: with everything absent that guidance is
+    /// towards, without a guided gaze target, and with it (the same if there is none, or if it is
+    /// not guided towards). `scratch` has [`FlowNet::scratch`] floats.
     pub(super) fn project(&self, exec: &mut Exec, condition: &Condition, scratch: &mut [f32], out: &mut [f32]) {
         let (c, rest) = (&self.config, self.rest_width());
         let layout = condition.layout();
@@ -221,9 +225,18 @@ impl FlowNet {
             row[rest - 4 - c.embed_gaze..rest - 4].fill(0.0);
         }
         with[rest - 1] = f32::from(u8::from(gaze));
-        exec.linear(&self.input_rest, embedded, 2, out, Epilogue::Store);
+        let (unconditional, conditional) = out.split_at_mut(c.width);
+        unconditional.copy_from_slice(&self.unconditional);
+        exec.linear(&self.input_rest, embedded, 2, conditional, Epilogue::Store);
         if let Some(sound) = self.sound.as_ref().filter(|_| condition.hears) {
-            sound.add(exec, &condition.values[layout.sound()], scratch, out);
+            sound.add(exec, &condition.values[layout.sound()], scratch, conditional);
+        }
+        if let Some((embed, input)) = self.activity.as_ref().filter(|_| condition.rests) {
+            let (hidden, rest) = scratch.split_at_mut(embed.out_features());
+            exec.linear(embed, &condition.values[layout.activity()], 1, hidden, Epilogue::Gelu);
+            let added = &mut rest[..c.width];
+            exec.linear(input, hidden, 1, added, Epilogue::Store);
+            add_to_rows(added, out);
         }
     }
 
@@ -248,8 +261,13 @@ impl Sound {
         e[embed] = 1.0;
         let added = &mut rest[..width];
         exec.linear(&self.input, e, 1, added, Epilogue::Store);
-        for row in out.chunks_exact_mut(width) {
-            row.iter_mut().zip(&*added).for_each(|(x, a)| *x += a);
-        }
+        add_to_rows(added, out);
+    }
+}
+
+/// Adds `added` to each row of `rows`.
+fn add_to_rows(added: &[f32], rows: &mut [f32]) {
+    for row in rows.chunks_exact_mut(added.len()) {
+        row.iter_mut().zip(added).for_each(|(x, a)| *x += a);
     }
 }

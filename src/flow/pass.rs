@@ -4,7 +4,8 @@
 use super::history::History;
 use super::nets::Nets;
 use super::network::FlowNet;
-use super::slots::{Branches, CHUNK, NO_GAZE, ROWS, Slots, UNCONDITIONAL};
+use super::schedule::Branches;
+use super::slots::{CHUNK, NO_GAZE, ROWS, Slots, UNCONDITIONAL};
 use crate::kernels::Exec;
 use crate::nn::Pass;
 use std::ops::Range;
@@ -143,11 +144,11 @@ impl Part<'_> {
         slots.begin_rows(tokens.clone().any(|token| history.condition(token).guides_gaze()));
         for (token, z_in) in tokens.zip(z_in.chunks_exact(d)) {
             let modulation = 2 * slot + usize::from(token == commit.end);
-            for branch in slots.active(history, token) {
+            for branch in slots.active(slot, history, token) {
                 slots.push_row(slot, branch, token);
-                let [without, with] = slots.projected(token);
-                let conditioning = match (slots.branches(), branch) {
-                    (Branches::Guided, UNCONDITIONAL) => net.unconditional(),
+                let [unconditional, without, with] = slots.projected(token);
+                let conditioning = match (slots.branches(slot), branch) {
+                    (Branches::Guided, UNCONDITIONAL) => unconditional,
                     (Branches::Guided, NO_GAZE) => without,
                     _ => with,
                 };
@@ -167,7 +168,7 @@ impl Part<'_> {
 
     /// How many of its rows, the last ones, are the new token's, and are read out.
     fn read(&self) -> usize {
-        self.new.map_or(0, |_| self.slots.active(self.history, self.commit.end).len())
+        self.new.map_or(0, |_| self.slots.active(self.slot, self.history, self.commit.end).len())
     }
 }
 

@@ -12,9 +12,11 @@ impl Generator {
         if self.making.sampler == Sampler::Single { self.student.as_ref() } else { self.reference.as_ref() }
     }
 
-    /// What the last evaluation predicted, `[branches, latent]`.
+    /// What the last evaluation predicted, `[3, latent]` of the reference network's branches (those
+    /// that were not run are the last that was), `[latent]` of the student.
     pub fn x1(&self) -> &[f32] {
-        self.visited().map_or(&[], Slots::x1)
+        let x1 = self.visited().map_or(&[][..], Slots::x1);
+        if self.making.sampler == Sampler::Single { &x1[..x1.len().min(self.making.z.len())] } else { x1 }
     }
 
     /// Brings the slot of evaluation `i` near enough to the present for it.

@@ -7,6 +7,27 @@ use crate::frame::Sampler;
 /// it.
 const GRID: u8 = 8;
 
+/// Guidance branches that a network is run with at a flow time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Branches {
+    /// Unconditional, conditional without the gaze target, and conditional with it.
+    Guided,
+    /// Conditional alone, gaze target included when set: guidance is distilled into the weights, or
+    /// has done its part at earlier flow times.
+    Plain,
+}
+
+/// What a slot is made for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SlotTimes {
+    /// Flow time at which its history is seen.
+    pub history: f32,
+    /// That of the new token.
+    pub new: f32,
+    /// Branches that are run.
+    pub branches: Branches,
+}
+
 /// A flow time, a fraction in lowest terms: equal times are equal fractions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct FlowTime {
@@ -66,22 +87,34 @@ impl Schedule {
         (0..sampler.evaluations()).filter_map(move |i| self.number(FlowTime::of(sampler, i)))
     }
 
-    /// Flow times of each slot in turns, as its history and its new token have it.
-    fn times(&self, clean_history: Option<CleanHistory>) -> Vec<f32> {
-        let values = self.0.iter().map(|time| time.value());
-        values.flat_map(|t| [clean_history.map_or(t, |c| c.time(t)), t]).collect()
+    /// What each slot is made for.
+    fn times(&self, clean_history: Option<CleanHistory>, guided_until: Option<f32>) -> Vec<SlotTimes> {
+        let times = |new: f32| SlotTimes {
+            history: clean_history.map_or(new, |c| c.time(new)),
+            new,
+            branches: if guided_until.is_none_or(|end| new < end) { Branches::Guided } else { Branches::Plain },
+        };
+        self.0.iter().map(|time| times(time.value())).collect()
     }
 }
 
-/// Flow times of the reference network's slots for `sampler` and the midpoint rules: each slot's,
-/// as the history and the new token have it.
-pub fn reference_times(sampler: Sampler, clean_history: Option<CleanHistory>) -> Vec<f32> {
-    Schedule::new(sampler).times(clean_history)
+/// The reference network's slots for `sampler` and the midpoint rules.
+pub fn reference_slots(
+    sampler: Sampler,
+    clean_history: Option<CleanHistory>,
+    guided_until: Option<f32>,
+) -> Vec<SlotTimes> {
+    Schedule::new(sampler).times(clean_history, guided_until)
 }
 
-/// The same of the student's one slot, which sees its history at `tau_history`.
-pub fn student_times(tau_history: f32) -> Vec<f32> {
-    vec![tau_history, 0.0]
+/// The student's one slot, which sees its history at `tau_history`.
+pub fn student_slots(tau_history: f32) -> Vec<SlotTimes> {
+    vec![SlotTimes { history: tau_history, new: 0.0, branches: Branches::Plain }]
+}
+
+/// Flow times of slots, in turns those of the history and of the new token.
+pub fn flow_times(slots: &[SlotTimes]) -> Vec<f32> {
+    slots.iter().flat_map(|slot| [slot.history, slot.new]).collect()
 }
 
 #[cfg(test)]
@@ -97,8 +130,9 @@ mod tests {
     fn a_slot_for_each_evaluation_and_none_twice() {
         for made_for in all() {
             let schedule = Schedule::new(made_for);
-            let times = schedule.times(None);
-            assert!(times.chunks_exact(2).all(|pair| pair[0] == pair[1] && (0.0..1.0).contains(&pair[0])));
+            let times = schedule.times(None, Some(0.3));
+            assert!(times.iter().all(|slot| slot.history == slot.new && (0.0..1.0).contains(&slot.new)));
+            assert!(times.iter().all(|slot| (slot.branches == Branches::Guided) == (slot.new < 0.3)));
             for (i, a) in schedule.0.iter().enumerate() {
                 assert!(schedule.0[..i].iter().all(|b| a != b && a.value() != b.value()), "{made_for}: {a:?}");
             }

@@ -1,15 +1,16 @@
 //! One key-value cache per flow time: what a network remembers of the history.
 //!
-//! Rings are numbered `(slot * branches + branch) * layers + layer`; those of the gaze branch come
-//! after all others, and are not touched, hence take no memory, before there is a gaze target:
-//! until then the branch is the one without. Position `t` of a ring holds token `t`. A pass writes
+//! Rings are numbered by slot, branch and layer; those of the gaze branch come after all others, and
+//! are not touched, hence take no memory, before there is a gaze target: until then the branch is
+//! the one without. Position `t` of a ring holds token `t`. A pass writes
 //! the new token's keys and values too; they are provisional, and the next pass over that position,
 //! when the token is finished, overwrites them.
 
 use super::history::History;
 use super::modulation::Modulation;
 use super::network::FlowNet;
-use super::projected::Projected;
+use super::projected::{INPUTS, Projected};
+use super::schedule::{Branches, SlotTimes, flow_times};
 use crate::error::Result;
 use crate::kernels::{Exec, KvCache, KvDtype};
 use crate::nn::Rows;
@@ -22,35 +23,22 @@ pub(super) const CHUNK: u64 = 8;
 /// Rows of a pass at most: those of a full chunk and a new token in each of three branches.
 pub(super) const ROWS: usize = 3 * (CHUNK as usize + 1);
 
-/// Guidance branches that a network is run with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Branches {
-    /// Unconditional, conditional without the gaze target, and conditional with it.
-    Guided,
-    /// Conditional alone, gaze target included when set: guidance is distilled into the weights.
-    Baked,
-}
-
-impl Branches {
-    /// Number of branches.
-    pub fn count(self) -> usize {
-        match self {
-            Branches::Guided => 3,
-            Branches::Baked => 1,
-        }
-    }
-}
+/// Predictions that [`Slots::x1`] holds: one for each branch of [`Branches::Guided`].
+const PREDICTIONS: usize = 3;
 
 /// Branch numbers of [`Branches::Guided`].
 pub(super) const UNCONDITIONAL: usize = 0;
 pub(super) const NO_GAZE: usize = 1;
 pub(super) const GAZE: usize = 2;
 
-/// A slot: the flow times at which its history and its new token are seen, and how far its cache is
+/// A slot: the flow time at which its history is seen, its branches, and how far its cache is
 /// filled.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Slot {
     tau_history: f32,
+    branches: Branches,
+    /// Rings of its branches but the gaze branch begin here, those of the gaze branch there.
+    rings: [usize; 2],
     /// Tokens before this are in the cache.
     pub(super) committed: u64,
     /// Tokens from this on are in the cache without a gap.
@@ -60,7 +48,6 @@ pub(super) struct Slot {
 /// The slots of one network.
 #[derive(Debug)]
 pub struct Slots {
-    branches: Branches,
     pub(super) slots: Vec<Slot>,
     modulation: Arc<Modulation>,
     cache: KvCache,
@@ -71,33 +58,39 @@ pub struct Slots {
     projected: Projected,
     /// The rows of the pass under way.
     rows: Rows,
-    /// Prediction of the last evaluation, `[branches, latent]`.
+    /// Prediction of the last evaluation, `[3, latent]`.
     x1: Vec<f32>,
 }
 
 impl Slots {
-    /// Slots for flow times, in turns those of the history and of the new token.
+    /// Slots for flow times.
     ///
     /// # Errors
     /// As [`FlowNet::modulation`].
-    pub fn new(exec: &mut Exec, net: &FlowNet, taus: &[f32], branches: Branches, dtype: KvDtype) -> Result<Self> {
+    pub fn new(exec: &mut Exec, net: &FlowNet, times: &[SlotTimes], dtype: KvDtype) -> Result<Self> {
         let c = net.config();
         let window = c.window_blocks as u64;
         let capacity = window + CHUNK;
-        let slots: Vec<_> =
-            taus.iter().step_by(2).map(|tau| Slot { tau_history: *tau, committed: 0, start: 0 }).collect();
-        let rings = slots.len() * branches.count() * c.layers;
+        let guided = times.iter().filter(|times| times.branches == Branches::Guided).count();
+        let mut rings = [0, (times.len() + guided) * c.layers];
+        let slots: Vec<_> = (times.iter())
+            .map(|times| {
+                let slot = Slot { tau_history: times.history, branches: times.branches, rings, committed: 0, start: 0 };
+                let own = if times.branches == Branches::Guided { [2, 1] } else { [1, 0] };
+                rings = [rings[0] + own[0] * c.layers, rings[1] + own[1] * c.layers];
+                slot
+            })
+            .collect();
         Ok(Self {
-            branches,
-            modulation: net.modulation(exec, taus)?,
-            cache: KvCache::new(rings, capacity as usize, c.heads, c.width, dtype),
+            modulation: net.modulation(exec, &flow_times(times))?,
+            cache: KvCache::new(rings[1], capacity as usize, c.heads, c.width, dtype),
             slots,
             gaze: false,
             layers: c.layers,
             window,
             projected: Projected::new(capacity + 1, c.width),
             rows: Rows::with_capacity(ROWS),
-            x1: vec![0.0; branches.count() * net.latent()],
+            x1: vec![0.0; PREDICTIONS * net.latent()],
         })
     }
 
@@ -110,17 +103,21 @@ impl Slots {
     /// Whether rows of the same slots of `self` and `other` can go through the layers together:
     /// modulation is the same.
     pub(super) fn alike(&self, other: &Slots) -> bool {
-        let same = |(a, b): (&Slot, &Slot)| a.tau_history.to_bits() == b.tau_history.to_bits();
-        let paired = self.slots.len() == other.slots.len() && self.slots.iter().zip(&other.slots).all(same);
-        paired && self.branches == other.branches
+        let same =
+            |(a, b): (&Slot, &Slot)| a.tau_history.to_bits() == b.tau_history.to_bits() && a.branches == b.branches;
+        self.slots.len() == other.slots.len() && self.slots.iter().zip(&other.slots).all(same)
     }
 
     /// Bytes of the caches that are in use.
     pub fn cache_bytes(&self) -> usize {
-        match self.branches {
-            Branches::Guided if !self.gaze => self.cache.bytes() / 3 * 2,
-            _ => self.cache.bytes(),
-        }
+        let guided = self.guided();
+        let all = self.slots.len() + 2 * guided;
+        self.cache.bytes() / all * if self.gaze { all } else { all - guided }
+    }
+
+    /// Number of slots that are guided.
+    fn guided(&self) -> usize {
+        self.slots.iter().filter(|slot| slot.branches == Branches::Guided).count()
     }
 
     /// Number of slots.
@@ -133,8 +130,13 @@ impl Slots {
         (end - self.slots[slot].committed.min(end)).min(self.window)
     }
 
-    /// Prediction of the last evaluation, `[branches, latent]`. Where gaze is not guided, the gaze
-    /// branch equals the one without.
+    /// Branches of slot `slot`.
+    pub fn branches(&self, slot: usize) -> Branches {
+        self.slots[slot].branches
+    }
+
+    /// Prediction of the last evaluation, `[3, latent]`: of each branch of a guided slot. Where gaze
+    /// is not guided, the gaze branch equals the one without; in a plain slot all are one.
     pub fn x1(&self) -> &[f32] {
         &self.x1
     }
@@ -145,22 +147,16 @@ impl Slots {
     }
 
     fn ring(&self, slot: usize, branch: usize) -> usize {
-        let (slots, count) = (self.slots.len(), self.branches.count());
-        let number = match (self.branches, branch) {
-            (Branches::Guided, GAZE) => slots * (count - 1) + slot,
-            (Branches::Guided, _) => slot * (count - 1) + branch,
-            (Branches::Baked, _) => slot,
-        };
-        number * self.layers
+        let [first, gaze] = self.slots[slot].rings;
+        if branch == GAZE { gaze } else { first + branch * self.layers }
     }
 
-    /// Gives the gaze branch rings of its own, with what the branch without a target holds.
+    /// Gives the gaze branches rings of their own, with what the branches without a target hold.
     pub(super) fn open_gaze(&mut self) {
-        if self.gaze || self.branches == Branches::Baked {
+        if std::mem::replace(&mut self.gaze, true) {
             return;
         }
-        self.gaze = true;
-        for slot in 0..self.slots.len() {
+        for slot in (0..self.slots.len()).filter(|slot| self.slots[*slot].branches == Branches::Guided) {
             let (from, to) = (self.ring(slot, NO_GAZE), self.ring(slot, GAZE));
             (0..self.layers).for_each(|layer| self.cache.copy_ring(from + layer, to + layer));
         }
@@ -169,10 +165,6 @@ impl Slots {
 
 /// What passes do with slots.
 impl Slots {
-    pub(super) fn branches(&self) -> Branches {
-        self.branches
-    }
-
     pub(super) fn modulation(&self) -> &Arc<Modulation> {
         &self.modulation
     }
@@ -195,15 +187,16 @@ impl Slots {
         }
     }
 
-    /// The projected conditioning of `token`, without a guided gaze target and with it.
-    pub(super) fn projected(&self, token: u64) -> [&[f32]; 2] {
+    /// The projected conditioning of `token`.
+    pub(super) fn projected(&self, token: u64) -> [&[f32]; INPUTS] {
         self.projected.of(token)
     }
 
-    /// Branches that are run for `token`: the gaze branch only where a target is guided towards.
-    pub(super) fn active(&self, history: &History, token: u64) -> Range<usize> {
-        match self.branches {
-            Branches::Baked => 0..1,
+    /// Branches of slot `slot` that are run for `token`: the gaze branch only where a target is
+    /// guided towards.
+    pub(super) fn active(&self, slot: usize, history: &History, token: u64) -> Range<usize> {
+        match self.branches(slot) {
+            Branches::Plain => 0..1,
             Branches::Guided if history.condition(token).guides_gaze() => 0..3,
             Branches::Guided => 0..2,
         }
@@ -237,7 +230,8 @@ impl Slots {
     /// A token whose gaze is not guided is the same in both conditional branches: copies its keys
     /// and values.
     pub(super) fn mirror_gaze_branch(&mut self, history: &History, slot: usize, token: u64) {
-        if self.gaze && !history.condition(token).guides_gaze() {
+        let branch = self.gaze && self.branches(slot) == Branches::Guided;
+        if branch && !history.condition(token).guides_gaze() {
             let (from, to) = (self.ring(slot, NO_GAZE), self.ring(slot, GAZE));
             (0..self.layers).for_each(|layer| self.cache.copy_token(from + layer, to + layer, token));
         }
@@ -248,12 +242,15 @@ impl Slots {
         self.slots[slot].committed = end;
     }
 
-    /// Takes the prediction of the branches that were run, none if there was no new token.
+    /// Takes the prediction of the branches that were run, none if there was no new token; the
+    /// others are the last of these.
     pub(super) fn take_x1(&mut self, x1: &[f32]) {
+        let latent = self.x1.len() / PREDICTIONS;
         self.x1[..x1.len()].copy_from_slice(x1);
-        let latent = self.x1.len() / self.branches.count();
-        if self.branches == Branches::Guided && x1.len() == 2 * latent {
-            self.x1.copy_within(NO_GAZE * latent..(NO_GAZE + 1) * latent, GAZE * latent);
+        if let Some(last) = x1.len().checked_sub(latent) {
+            for at in (x1.len()..self.x1.len()).step_by(latent) {
+                self.x1.copy_within(last..last + latent, at);
+            }
         }
     }
 }

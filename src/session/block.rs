@@ -5,6 +5,7 @@ use super::governor::{Hold, Plan};
 use super::inputs::{LISTENERS, Listening};
 use super::maker::Maker;
 use super::probe::{Probe, tell};
+use super::rest;
 use super::state::BlockState;
 use super::tools::{DramTools, Kit, SarahTools, Tools};
 use crate::dram::Agent;
@@ -95,7 +96,10 @@ impl Block<'_> {
             Maker::Latent(maker) => {
                 let gaze = engine.config.gaze.as_ref();
                 let gaze = options.diagnostics.gaze_control.cue(gaze, options.gaze, plan.sampler, options.seed, *block);
-                self.outcome = inputs.prepare(*block, &root, gaze, options.sensitivity, probe);
+                let rest = engine.config.rest.as_ref();
+                let drawn = || rest.and_then(|rest| rest::level(rest, plan.sampler, options.seed, *block));
+                let activity = options.diagnostics.activity.filter(|_| rest.is_some()).or_else(drawn);
+                self.outcome = inputs.prepare(*block, &root, (gaze, activity), options.sensitivity, probe);
                 if self.outcome.is_err() {
                     return;
                 }

@@ -52,6 +52,7 @@ impl ByLatent {
             sampler: options.sampler,
             dtype: options.diagnostics.cache,
             clean_history: options.clean_history(engine),
+            guided_until: engine.config.session.guided_until,
         };
         let condition = Condition::absent(engine.layout());
         exec.begin();

@@ -2,7 +2,7 @@
 
 use super::{GazeControl, argument};
 use crate::audio::AudioBackend;
-use crate::config::CleanHistory;
+use crate::config::{ACTIVITY, CleanHistory};
 use crate::error::Result;
 use crate::kernels::KvDtype;
 
@@ -39,6 +39,9 @@ pub enum HistoryTime {
 pub struct Diagnostics {
     /// What the gaze target, or its absence, means to the network.
     pub gaze_control: GazeControl,
+    /// What the network is told at rest instead of the activity that is drawn, of a bundle that is
+    /// told of it.
+    pub activity: Option<[f32; ACTIVITY]>,
     /// Flow time at which history enters the reference network.
     pub history: HistoryTime,
     /// Storage of the key-value caches; f16 but for checks of the maths.
@@ -58,6 +61,7 @@ impl Default for Diagnostics {
     fn default() -> Self {
         Self {
             gaze_control: GazeControl::Calibrated,
+            activity: None,
             history: HistoryTime::Bundle,
             cache: KvDtype::F16,
             anchoring: Anchoring::Bundle,

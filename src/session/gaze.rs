@@ -62,16 +62,21 @@ impl GazeControl {
     }
 }
 
-/// The level of free gaze in a block: stretches whose borders lie anywhere in the first half of
-/// their period, each with a level drawn from the calibration's quantiles. A function of the
+/// The number in 0 .. 1 that is drawn for the stretch in which a block lies: stretches of `seconds`
+/// on average, whose borders lie anywhere in the first half of their period. A function of the
 /// block's number, so that it needs no state and replays.
-fn level(config: &GazeConfig, seed: u64, block: u64) -> f32 {
-    let periods = block as f64 * BLOCK_FRAMES as f64 / f64::from(FPS) / f64::from(config.seconds);
+pub(super) fn drawn(seed: u64, block: u64, seconds: f32) -> f32 {
+    let periods = block as f64 * BLOCK_FRAMES as f64 / f64::from(FPS) / f64::from(seconds);
     let period = periods as u64;
     let begun = periods - period as f64 >= 0.5 * f64::from(uniform(seed, period)[0]);
     // The stretch before the first border is one too.
     let stretch = if begun { period + 1 } else { period };
-    let at = uniform(seed, stretch)[1] * (config.levels.len() - 1) as f32;
+    uniform(seed, stretch)[1]
+}
+
+/// The level of free gaze in a block, drawn for each stretch from the calibration's quantiles.
+fn level(config: &GazeConfig, seed: u64, block: u64) -> f32 {
+    let at = drawn(seed, block, config.seconds) * (config.levels.len() - 1) as f32;
     let below = at as usize;
     let above = (below + 1).min(config.levels.len() - 1);
     config.levels[below] + (at - below as f32) * (config.levels[above] - config.levels[below])
@@ -80,13 +85,13 @@ fn level(config: &GazeConfig, seed: u64, block: u64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::GazeCurve;
+    use crate::config::ResponseCurve;
 
     fn config() -> GazeConfig {
         GazeConfig {
-            guided: GazeCurve(vec![[0.1, -0.4], [0.5, 0.3], [0.9, 0.7]]),
-            unguided: GazeCurve(vec![[0.0, -1.0], [1.0, 1.0]]),
-            student: Some(GazeCurve(vec![[0.2, 0.0], [0.8, 0.5]])),
+            guided: ResponseCurve(vec![[0.1, -0.4], [0.5, 0.3], [0.9, 0.7]]),
+            unguided: ResponseCurve(vec![[0.0, -1.0], [1.0, 1.0]]),
+            student: Some(ResponseCurve(vec![[0.2, 0.0], [0.8, 0.5]])),
             levels: vec![-0.2, 0.4, 0.8, 1.0],
             seconds: 20.0,
         }

@@ -2,16 +2,17 @@
 
 use super::gaze::Cue;
 use super::probe::{Probe, tell};
+use super::rest::{LOUD, Rest};
 use super::stats::{Delays, InputStats};
 #[cfg(feature = "tract")]
 use crate::audio::TractEncoder;
 use crate::audio::{AudioBackend, AudioEncoder, Speaker, Voice, VoiceInput};
-use crate::config::Config;
+use crate::config::{ACTIVITY, Config};
 use crate::dram::Seen;
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::flow::Condition;
-use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES, FPS, Root, Transform};
+use crate::frame::{BLOCK_FRAMES, BLOCK_SAMPLES, FPS, FRAME_SAMPLES, Root, Transform};
 use crate::hearing::{Hearing, SoundInput};
 use crate::kernels::Exec;
 use crate::session::SessionOptions;
@@ -27,6 +28,8 @@ pub(super) struct EncodedVoice {
     encoder: Encoder,
     samples: Box<[f32; BLOCK_SAMPLES]>,
     features: Vec<f32>,
+    /// The last frame in which it spoke.
+    spoke: Option<u64>,
     /// Whether `features` are those of the next block.
     heard: Result<bool>,
     /// Blocks by which it lags.
@@ -100,6 +103,7 @@ pub(super) struct Inputs {
     head: HeadInput,
     track: HeadTrack,
     user_delay: u64,
+    rest: Rest,
     pub(super) condition: Condition,
 }
 
@@ -110,6 +114,7 @@ impl EncodedVoice {
             encoder: Encoder::new(engine, options.diagnostics.audio)?,
             samples: Box::new([0.0; BLOCK_SAMPLES]),
             features: vec![0.0; BLOCK_FRAMES * engine.config.audio.features],
+            spoke: None,
             heard: Ok(false),
             delay: u64::from(delay),
             first: 0,
@@ -119,7 +124,7 @@ impl EncodedVoice {
 
     fn reset(&mut self, first: u64) {
         self.voice.reset_at(first);
-        (self.first, self.open, self.heard) = (first, false, Ok(false));
+        (self.first, self.open, self.heard, self.spoke) = (first, false, Ok(false), None);
     }
 
     /// The block whose sound `block` may know, unless that was before the session's start.
@@ -160,6 +165,10 @@ impl EncodedVoice {
         if !self.open {
             self.encoder.reset()?;
             self.open = true;
+        }
+        let mut frames = self.samples.chunks_exact(FRAME_SAMPLES);
+        if let Some(last) = frames.rposition(|frame| frame.iter().any(|sample| sample.abs() > LOUD)) {
+            self.spoke = Some(known * BLOCK_FRAMES as u64 + last as u64);
         }
         self.encoder.encode(exec, engine, &self.samples[..], &mut self.features)?;
         Ok(true)
@@ -228,6 +237,7 @@ impl Inputs {
             head: HeadInput::new(),
             track: HeadTrack::new(),
             user_delay: u64::from(engine.config.user_delay_blocks),
+            rest: Rest::new(),
             condition: Condition::absent(engine.layout()),
         })
     }
@@ -239,6 +249,7 @@ impl Inputs {
         self.hearing.iter_mut().for_each(|hearing| hearing.reset());
         self.head.reset();
         self.track.reset();
+        self.rest.reset();
         self.condition.clear();
     }
 
@@ -338,7 +349,7 @@ impl Inputs {
         &mut self,
         block: u64,
         root: &Root,
-        gaze: Option<Cue>,
+        (gaze, activity): (Option<Cue>, Option<[f32; ACTIVITY]>),
         sensitivity: f32,
         probe: &mut Option<&mut dyn Probe>,
     ) -> Result<()> {
@@ -351,7 +362,8 @@ impl Inputs {
             self.condition.set_user_voice(features);
             tell(probe, block, "user_features", features);
         }
-        if let Some(positions) = self.user_in_agent_frame(block, root) {
+        let user = self.user_in_agent_frame(block, root);
+        if let Some((positions, _)) = user {
             self.condition.set_user(&positions);
             tell(probe, block, "conditioning.user", &positions);
         }
@@ -364,6 +376,11 @@ impl Inputs {
         }
         if let Some(Cue { value, guided }) = gaze {
             self.condition.set_gaze(value, guided);
+        }
+        let rests = self.rest.look(block, self.agent.spoke, user.map(|(_, last)| last), self.reaction());
+        if let Some(level) = activity.filter(|_| rests) {
+            self.condition.set_activity(&level);
+            tell(probe, block, "conditioning.activity", &level);
         }
         Ok(())
     }
@@ -391,21 +408,22 @@ impl Inputs {
     }
 
     /// Floor positions `(x, z)` of the user over the four frames that `block` may know, in the
-    /// agent's frame; `None` when the last of them is not known. Unknown earlier ones take the
-    /// position that follows them.
-    fn user_in_agent_frame(&mut self, block: u64, root: &Root) -> Option<[f32; 8]> {
+    /// agent's frame, and the last of them in the world; `None` when that is not known. Unknown
+    /// earlier ones take the position that follows them.
+    fn user_in_agent_frame(&mut self, block: u64, root: &Root) -> Option<([f32; 8], Vec3)> {
         let seen = block.checked_sub(self.user_delay).filter(|seen| *seen >= self.user.first)?;
         let now = (block * BLOCK_FRAMES as u64) as f64 / f64::from(FPS);
         let mut samples = [UserSample::default(); BLOCK_FRAMES];
         self.track.block(seen * BLOCK_FRAMES as u64, now, &mut samples);
-        let mut next = known(samples[BLOCK_FRAMES - 1])?;
+        let last = known(samples[BLOCK_FRAMES - 1])?;
+        let mut next = last;
         let mut positions = [0.0; 2 * BLOCK_FRAMES];
         for (sample, xz) in samples.iter().zip(positions.chunks_exact_mut(2)).rev() {
             next = known(*sample).unwrap_or(next);
             let local = root.to_local(next);
             xz.copy_from_slice(&[local.x, local.z]);
         }
-        Some(positions)
+        Some((positions, last))
     }
 
     pub(super) fn stats(&self) -> InputStats {

@@ -14,6 +14,7 @@
 //! | `diagnostics` | what measurements and tests change about it |
 //! | `inputs` | voices, head positions and sounds to the conditioning of a block |
 //! | `gaze` | the wanted gaze to the gaze channel, free gaze included |
+//! | `rest` | whether the body is at rest, and how active it is then |
 //! | `state` | all that changes from block to block |
 //! | `maker` | what makes the poses, by the bundle's kind |
 //! | `by_latent` | the flow model: a latent a block, decoded |
@@ -56,6 +57,7 @@ mod options;
 mod pipeline;
 mod poll;
 mod probe;
+mod rest;
 mod settings;
 mod shared;
 mod state;

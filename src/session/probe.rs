@@ -9,6 +9,7 @@ use crate::frame::Frame;
 /// | `agent_features`, `user_features` | `[4, audio features]`, absent voices left out |
 /// | `conditioning.user` | `[8]` metres in the agent's frame, left out while unknown |
 /// | `conditioning.sound` | `[S]`, left out before the first sound |
+/// | `conditioning.activity` | `[3]`, left out where the body is not at rest |
 /// | `hearing.ears` | `[2, 3200]` pascals at the left and the right ear in the block before, likewise |
 /// | `hearing.features` | `[4, hearing features]`, likewise |
 /// | `x1` | `[branches, latent]`, once per evaluation |

@@ -110,11 +110,11 @@ class Bundle:
         return self.tensors["idle.frames"].float()
 
 
-def flow_from(config, latent, audio_features, hearing=None):
-    """The network of a `flow` section; `hearing`: that section of the bundle, if it has one."""
+def flow_from(config, latent, audio_features, hearing=None, rest=None):
+    """The network of a `flow` section; `hearing`, `rest`: those sections of the bundle, if it has them."""
     keys = ("layers", "width", "heads", "mlp", "tau_width", "window_blocks", "embed_latent", "embed_user", "embed_voice", "embed_gaze", "user_scale")
     sound = {"sound_features": sound_features(hearing), "embed_sound": hearing["embed"]} if hearing else {}
-    return FlowNet(latent, audio_features, **{k: config[k] for k in keys}, **sound)
+    return FlowNet(latent, audio_features, **{k: config[k] for k in keys}, **sound, embed_activity=rest["embed"] if rest else 0)
 
 
 def sound_features(hearing):
@@ -166,7 +166,7 @@ def read(path):
     tensors = dequantised(tensors)
     features = 3 + 36 * len(config["rig"]["joints"])
     hearing = config.get("hearing")
-    net = lambda: flow_from(config["flow"], config["vae"]["latent"], config["audio"]["features"], hearing)
+    net = lambda: flow_from(config["flow"], config["vae"]["latent"], config["audio"]["features"], hearing, config.get("rest"))
     return Bundle(
         config, tensors,
         load_net("audio", encoder_from(config["audio"]), tensors),

@@ -17,12 +17,14 @@ Contents (K blocks, T = 4 K frames):
     latents.midpoint2, latents.midpoint1, latents.clean (midpoint 4, history at least at 0.9 from 0.3 on) [K, Dz], with their own history and user in their own agent frame
     student [K, Dz], student.user [K, 8]: history tau_h z + (1 - tau_h) eps at tau_h = tau_history, new token eps at 0
     encoder.frames [16, F] metres, encoder.mu, encoder.logvar [4, Dz]
+A bundle that is told of the activity at rest: rests [K], the blocks in which it is; its user hardly moves.
 A bundle that hears the room has three sounds in it, pushed whole at the starts of their blocks, and sensitivity 0.5:
     sounds.{i} [N] pascals at 24 kHz, sounds.places [3, 3], sounds.blocks [3];  and of the main run (midpoint 4)
     hearing.ears [24, 2, 800] of frames 8 to 31, hearing.levels [T, 2], hearing.place [T, 3], hearing.known [T], hearing.features [T, D_s],
     conditioning.sound [K, S], conditioning.heard [K]; with the heads hearing.middle, hearing.left [T, 3] of the frames as decoded
 """
 import argparse
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -33,6 +35,7 @@ from .hearing import ears
 from .motion import features as feat, rig
 from .nets.flow import Condition, absent, sound_width
 from .nets.stream import Reference, branches
+from .train.activity import at_rest
 from .train.geometry import integrate, to_local
 
 GAZE_TARGET, SENSITIVITY = 0.8, 0.5
@@ -59,14 +62,14 @@ def listen(audio, voice, frames):
 class Session:
     """Runs a session of the bundle over given inputs with one of its samplers."""
 
-    def __init__(self, b, agent, voice, path, eps, eps_idle, steps=4, student=False, clean=None, sounds=()):
+    def __init__(self, b, agent, voice, path, eps, eps_idle, steps=4, student=False, clean=None, sounds=(), rests=()):
         m = len(b.idle()) // 4
         net, settings = (b.student, b.config["student"]) if student else (b.flow, b.config["session"])
-        reference = Reference(net, settings["guidance"], settings["gaze_guidance"], clean)
+        reference = Reference(net, settings["guidance"], settings["gaze_guidance"], clean, b.config["session"].get("guided_until"))
         self.idle = b.encode(b.idle()[None])
         self.b, self.sounds, self.sound, self.heard = b, sounds, [], []
         self.width = bundles.sound_features(b.config.get("hearing"))
-        none = absent(1, m, b.config["audio"]["features"], sound_features=self.width)
+        none = resting(b, absent(1, m, b.config["audio"]["features"], sound_features=self.width), False)
         reference.push(self.idle, eps_idle[None], branches(none, True))
         root = torch.zeros(1, 3, dtype=torch.float64)
         z, self.user, self.flags, self.x1, self.roots = [self.idle], [], [], [], []
@@ -76,7 +79,8 @@ class Session:
             heard = voice[block.start - 4:block.start].reshape(1, 1, -1) if k else torch.zeros(1, 1, 4 * voice.shape[1])
             flags = torch.tensor([[[float(k > 0), 1.0, float(k > 0), 1.0]]])
             sound = self.room(k, decoded if k else None, root) if self.width else ()
-            cond = branches(Condition(user, agent[block].reshape(1, 1, -1), heard, torch.full((1, 1, 4), GAZE_TARGET), flags, *sound), True)
+            told = Condition(user, agent[block].reshape(1, 1, -1), heard, torch.full((1, 1, 4), GAZE_TARGET), flags, *sound)
+            cond = branches(resting(b, told, rests[4 * k]), True)
             e = eps[None, k:k + 1]
             if student:
                 new = reference.single(e, cond, settings["tau_history"])
@@ -117,17 +121,28 @@ class Session:
         return sound, flag
 
 
+def resting(b, cond, rests):
+    """The condition with the activity of a body at rest, of a bundle that is told of it: there is one level to draw from."""
+    if not b.config.get("rest"):
+        return cond
+    level, shape = torch.tensor(b.config["rest"]["levels"][0]), cond.flags.shape[:2]
+    return replace(cond, activity=level.expand(*shape, -1), resting=torch.full((*shape, 1), float(rests)))
+
+
 @torch.no_grad()
 def compute(b, blocks=20, seed=7):
     torch.manual_seed(seed)
     latent, frames, m = b.config["vae"]["latent"], 4 * blocks, len(b.idle()) // 4
     agent_voice, user_voice = voices(6 * 3200, 2), voices(6 * 3200 - 777, 5)
     t = torch.arange(frames) / 30
-    path = torch.stack([1.2 * torch.sin(0.8 * t), 1.6 + 0 * t, 1.5 + 0.4 * torch.cos(1.1 * t)], -1)
+    way = 0.2 if b.config.get("rest") else 1.0  # a user who stands, where that counts
+    path = torch.stack([1.2 * way * torch.sin(0.8 * t), 1.6 + 0 * t, 1.5 + 0.4 * way * torch.cos(1.1 * t)], -1)
     eps, eps_idle = torch.randn(blocks, latent), torch.randn(m, latent)
     agent, voice = listen(b.audio, agent_voice, frames), listen(b.audio, user_voice, frames)
     sounds = room_sounds() if b.hearing else ()
-    run = lambda **kw: Session(b, agent, voice, path, eps, eps_idle, sounds=sounds, **kw)
+    spoken = torch.nn.functional.pad(agent_voice, (0, 800 * frames - len(agent_voice))).numpy()
+    rests = at_rest(spoken, path.numpy(), frames)
+    run = lambda **kw: Session(b, agent, voice, path, eps, eps_idle, sounds=sounds, rests=rests, **kw)
     main = run()
     mu, _ = b.vae.encoder(b.standardise(b.idle()[None]))
     some = torch.tensor([*range(4), *range(frames // 2, frames // 2 + 4), *range(frames - 8, frames)])
@@ -148,7 +163,7 @@ def compute(b, blocks=20, seed=7):
     if b.student is not None:
         s = run(student=True)
         out |= {"student": s.z, "student.user": s.user}
-    return out | heard_by(main, sounds)
+    return out | heard_by(main, sounds) | ({"rests": torch.tensor(rests[::4]).int()} if b.config.get("rest") else {})
 
 
 def room_sounds():

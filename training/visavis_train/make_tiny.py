@@ -2,6 +2,7 @@
 
     python -m visavis_train.make_tiny --out tests/goldens/tiny.safetensors
     python -m visavis_train.make_tiny --hearing --out tests/goldens/hearing.safetensors      one that hears the room
+    python -m visavis_train.make_tiny --rest --out tests/goldens/rest.safetensors            one that is told how active a body at rest is, guided early only
 """
 import argparse
 
@@ -47,7 +48,7 @@ def lively(net, scale=1.0):
     return net.eval()
 
 
-def build(seed=1, hearing=False):
+def build(seed=1, hearing=False, rest=False):
     torch.manual_seed(seed)
     x = sway(400)
     mean = x.mean(0)
@@ -59,7 +60,8 @@ def build(seed=1, hearing=False):
         vae.decoder.out.weight.mul_(0.5)
         vae.encoder.frame.weight.mul_(2)
     audio = lively(AudioEncoder(AUDIO, 8), 1.6)
-    flow, student = (lively(bundle.flow_from(FLOW, latent, 8)) for _ in range(2))
+    told = {"embed": 6, "levels": [[0.5, -0.3, 0.2]], "seconds": 10.0} if rest else None
+    flow, student = (lively(bundle.flow_from(FLOW, latent, 8, rest=told)) for _ in range(2))
     tensors = {"stats.pose_mean": mean, "stats.pose_std": std, "idle.frames": x[:16],
                "stats.latent_mean": 0.1 * torch.randn(latent), "stats.latent_std": 0.5 + torch.rand(latent)}
     for prefix, net in (("audio", audio), ("vae", vae), ("flow", flow), ("student", student)):
@@ -79,6 +81,9 @@ def build(seed=1, hearing=False):
         description="Random weights for tests; its motion means nothing.", licence="Same as the code.",
         student={"tau_history": 0.9375, "guidance": 1.3, "gaze_guidance": 2.5}, **heard)
     config["session"] = {"guidance": 1.3, "gaze_guidance": 2.5, "anchor_period": 0, "anchor_radius": 1000.0}
+    if rest:
+        config["rest"] = told
+        config["session"]["guided_until"] = 0.3
     return tensors, config
 
 
@@ -87,8 +92,9 @@ def main():
     parser.add_argument("--out", required=True)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--hearing", action="store_true", help="networks hear the room")
+    parser.add_argument("--rest", action="store_true", help="networks are told of the activity at rest; late evaluations are not guided")
     args = parser.parse_args()
-    tensors, config = build(args.seed, args.hearing)
+    tensors, config = build(args.seed, args.hearing, args.rest)
     bundle.write(args.out, tensors, config, half=True)
 
 

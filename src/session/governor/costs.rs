@@ -70,8 +70,7 @@ impl Work {
 
     /// A block with `sampler`: with its slots up to date, and as far behind as they are.
     pub(in crate::session) fn block(&self, generator: &Generator, sampler: Sampler, branches: usize) -> [f64; 2] {
-        let branches = if sampler == Sampler::Single { 1 } else { branches };
-        let evaluation = |behind: u64| {
+        let evaluation = |branches: usize, behind: u64| {
             // What does not fit into the pass of the evaluation goes before it, eight tokens a
             // pass.
             let before = behind.saturating_sub(1) / CHUNK;
@@ -79,8 +78,9 @@ impl Work {
         };
         let mut costs = [self.base; 2];
         for slot in generator.visits(sampler) {
-            costs[0] += evaluation(1);
-            costs[1] += evaluation(generator.behind(slot));
+            let branches = if generator.guides(slot) { branches } else { 1 };
+            costs[0] += evaluation(branches, 1);
+            costs[1] += evaluation(branches, generator.behind(slot));
         }
         costs
     }

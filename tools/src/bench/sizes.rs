@@ -107,12 +107,14 @@ impl Size {
             dram: None,
             mospa: None,
             hearing: None,
+            rest: None,
             student: Some(StudentConfig { tau_history: 0.9, guidance: 2.0, gaze_guidance: 1.5, temperature: None }),
             session: SessionConfig {
                 guidance: 1.3,
                 gaze_guidance: 1.5,
                 temperature: 0.75,
                 clean_history: None,
+                guided_until: None,
                 bridge: 0.8,
                 // A round takes about a window of blocks; between two of them there are blocks
                 // without.

@@ -1,5 +1,5 @@
-//! `visavis calibrate`: measures what a model's gaze channel does, and writes it into its bundle, with other defaults for
-//! sessions where they are given.
+//! `visavis calibrate`: measures what a model's gaze channel does, and what it does at rest as it is told, and writes it
+//! into its bundle, with other defaults for sessions where they are given.
 
 use super::eval::show;
 use super::values::{GuidanceArgs, temperature};
@@ -9,10 +9,10 @@ use clap::builder::RangedU64ValueParser;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Mutex;
-use visavis::internals::config::{Config, GazeConfig, GazeCurve};
+use visavis::internals::config::{Config, GazeConfig, ResponseCurve};
 use visavis::internals::kernels::Kernels;
 use visavis::{BundleFile, Engine, Error, ErrorKind, Result};
-use visavis_tools::eval::{Clip, calibrate};
+use visavis_tools::eval::{Clip, calibrate, calibrate_rest};
 use visavis_tools::export::write_atomically;
 
 #[derive(Debug, Args)]
@@ -73,6 +73,12 @@ pub fn run(args: &CalibrateArgs) -> Result<()> {
     let gaze = calibrate(&engine, &clips, args.windows, args.threads, &|p| show(&stage, p))?;
     let text = summary(args, &gaze);
     settings.gaze = Some(gaze);
+    if settings.rest.is_some() {
+        // Free gaze is part of how a body rests.
+        let file = BundleFile::from_bytes(file.with_settings(&settings)?, &args.input);
+        let engine = Engine::from_file(&file, Kernels::detect()?)?;
+        settings.rest = calibrate_rest(&engine, args.threads, &|p| show(&stage, p))?;
+    }
     let bytes = file.with_settings(&settings)?;
     write_atomically(&args.output, |w| w.write_all(&bytes))?;
     print(&text)
@@ -81,7 +87,7 @@ pub fn run(args: &CalibrateArgs) -> Result<()> {
 fn summary(args: &CalibrateArgs, gaze: &GazeConfig) -> String {
     let mut text = format!("{}\n", args.output.display());
     // Writing to a string does not fail.
-    for (name, GazeCurve(points)) in gaze.curves() {
+    for (name, ResponseCurve(points)) in gaze.curves() {
         let points: Vec<_> = points.iter().map(|[score, channel]| format!("{channel:.2}: {score:.2}")).collect();
         let _ = writeln!(text, "  {name:<9} channel: gaze score   {}", points.join("  "));
     }

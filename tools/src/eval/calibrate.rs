@@ -7,7 +7,7 @@ use super::parallel::each;
 use super::window::{WINDOW, Window};
 use crate::metrics::head_angle;
 use std::sync::Arc;
-use visavis::internals::config::{GazeConfig, GazeCurve};
+use visavis::internals::config::{GazeConfig, ResponseCurve};
 use visavis::internals::session::{Diagnostics, GazeControl};
 use visavis::{Engine, Error, ErrorKind, FPS, Result, Sampler, SessionOptions};
 
@@ -94,7 +94,7 @@ fn quantiles(values: &[f32]) -> Vec<f32> {
 /// A curve that ascends, from points by ascending channel value: neighbours that do not ascend are
 /// pooled (isotonic regression by pool adjacent violators, Ayer et al. 1955), and a pool enters as
 /// one point.
-fn ascending(points: &[[f32; 2]], name: &str) -> Result<GazeCurve> {
+pub(super) fn ascending(points: &[[f32; 2]], name: &str) -> Result<ResponseCurve> {
     let mut pools: Vec<([f32; 2], f32)> = Vec::new();
     for point in points {
         let (mut pool, mut size) = (*point, 1.0);
@@ -105,10 +105,10 @@ fn ascending(points: &[[f32; 2]], name: &str) -> Result<GazeCurve> {
         pools.push((pool, size));
     }
     if pools.len() < 2 {
-        let message = format!("{name}: this model's gaze does not follow its gaze channel, so it cannot be calibrated");
+        let message = format!("{name}: this model does not follow the channel, so it cannot be calibrated");
         return Err(Error::new(ErrorKind::Argument, message));
     }
-    Ok(GazeCurve(pools.into_iter().map(|(point, _)| point).collect()))
+    Ok(ResponseCurve(pools.into_iter().map(|(point, _)| point).collect()))
 }
 
 #[cfg(test)]

@@ -25,6 +25,7 @@
 //! # }
 //! ```
 
+mod activity;
 mod bank;
 mod calibrate;
 mod clip;
@@ -44,6 +45,7 @@ mod synthetic;
 mod targets;
 mod window;
 
+pub use activity::calibrate_rest;
 pub use bank::Bank;
 pub use calibrate::calibrate;
 pub use clip::{Clip, Segment};
@@ -205,11 +207,12 @@ pub fn evaluate(
     let real = people::Real::read()?;
     let mut idle = vec![Idle { name: "real people".into(), figures: real.idle }];
     idle.extend(Idle::of_clips(rig, clips)?);
+    let sessions = if options.quick { people::FEW } else { people::SESSIONS };
     for &sampler in &samplers {
         let seed = u64::from(options.seed) << 32;
         let session = SessionOptions { sampler, gaze: None, seed, ..options.session.clone() };
         for seen in [true, false] {
-            idle.push(Idle::of_sessions(engine, &session, seen, options.threads, options.quick)?);
+            idle.push(Idle::of_sessions(engine, &session, seen, options.threads, sessions)?);
         }
     }
 

@@ -17,8 +17,9 @@ use visavis::{Engine, Error, ErrorKind, FPS, Frame, Result, Rig, SessionOptions}
 /// that are not part of this repository.
 const PEOPLE: &str = include_str!("people.json");
 /// Silent sessions that are averaged, and the seconds of each: eight minutes.
-const RUNS: usize = 4;
-const SECONDS: usize = 120;
+pub(super) const SESSIONS: (usize, usize) = (4, 120);
+/// The same for a look.
+pub(super) const FEW: (usize, usize) = (1, 20);
 /// Pauses up to this long belong to the speech around them, frames.
 const PAUSE: usize = 18;
 /// A user whose head is slower than this stands, m/s.
@@ -87,15 +88,16 @@ impl Idle {
         Ok((figures.seconds > 0.0).then(|| Self { name: "corpus".into(), figures }))
     }
 
-    /// Silent sessions with a user who stands before the agent, or without one.
+    /// Silent sessions, how many and how long each, with a user who stands before the agent, or
+    /// without one.
     pub(super) fn of_sessions(
         engine: &Arc<Engine>,
         options: &SessionOptions,
         seen: bool,
         threads: usize,
-        quick: bool,
+        (runs, seconds): (usize, usize),
     ) -> Result<Self> {
-        let (runs, frames) = if quick { (1, 20 * FPS as usize) } else { (RUNS, SECONDS * FPS as usize) };
+        let frames = seconds * FPS as usize;
         let tallies = each(threads, runs, &|_| {}, &|run| {
             let voice = || Some(vec![0.0; frames * FRAME_SAMPLES]);
             let user = std::iter::repeat_n(Vec3::new(0.0, 1.65, 1.6), if seen { frames } else { 0 });

@@ -106,7 +106,8 @@ def roll(b, w, chosen, student=False, seed=0, hears="sounds"):
     frames, n, session, room = w.frames(segment, at), len(at), b.config["session"], b.config["hearing"]
     cond.flags[..., GAZE] = 1
     settings = dict(student=True, tau=b.config["student"]["tau_history"]) if student else dict(student=False, tau=session["clean_history"]["tau"])
-    stream = Stream(b.student if student else b.flow, n, session["guidance"], session["gaze_guidance"], True, 4, settings["tau"], session["clean_history"]["from"], student)
+    stream = Stream(b.student if student else b.flow, n, session["guidance"], session["gaze_guidance"], True, 4, settings["tau"], session["clean_history"]["from"], student,
+                    session.get("guided_until"))
     eps = bundles.temperature(b.config, student) * torch.randn_like(z)
     stream.warm(z[:, :WARM], eps[:, :WARM], cond.at(slice(WARM)))
     decoder, placed = DecoderStream(b.vae.decoder), lambda z: z * b.stat("latent_std") + b.stat("latent_mean")

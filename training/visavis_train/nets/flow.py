@@ -9,13 +9,15 @@ import torch.nn.functional as F
 from .layers import Layer, band_mask, bias_of, gelu, modulated, places, rotary
 
 USER, AGENT, VOICE, GAZE = range(4)  # order of the presence flags
+ACTIVITY = 3  # how active a body at rest is (train/activity.py)
 
 
 @dataclass
 class Condition:
     """Conditioning of K tokens: user [B, K, 8] metres in the agent's frame, agent and voice [B, K, 4 D_a] features
     (the agent's voice and the user's), gaze [B, K, 4], flags [B, K, 4] of presence. For networks that hear the room, sound
-    [B, K, S] (`sound_width`) and heard [B, K, 1], its flag; else None."""
+    [B, K, S] (`sound_width`) and heard [B, K, 1], its flag; for networks that are told how active a body at rest is, activity
+    [B, K, ACTIVITY] and resting [B, K, 1], its flag; else None."""
     user: torch.Tensor
     agent: torch.Tensor
     voice: torch.Tensor
@@ -23,6 +25,8 @@ class Condition:
     flags: torch.Tensor
     sound: torch.Tensor = None
     heard: torch.Tensor = None
+    activity: torch.Tensor = None
+    resting: torch.Tensor = None
 
     def map(self, f):
         return Condition(*(None if t is None else f(t) for t in self.parts()))
@@ -35,7 +39,8 @@ class Condition:
         return self.map(lambda t: t[:, tokens])
 
     def dropped(self, *which):
-        """The same with the flags of some modalities cleared; all of them, sounds too, without arguments."""
+        """The same with the flags of some modalities cleared; all of them, sounds too, without arguments. Activity stays: guidance is towards what
+        is heard and seen."""
         flags = self.flags.clone()
         flags[..., list(which) or slice(None)] = 0
         return replace(self, flags=flags, heard=self.heard if which or self.heard is None else torch.zeros_like(self.heard))
@@ -69,8 +74,9 @@ def tau_embedding(tau, width):
 
 class FlowNet(nn.Module):
     def __init__(self, latent=64, audio_features=64, layers=4, width=256, heads=4, mlp=4, tau_width=128, window_blocks=48,
-                 embed_latent=128, embed_user=64, embed_voice=64, embed_gaze=16, user_scale=2.0, sound_features=0, embed_sound=64):
-        """`sound_features`: features of what is heard in the room, 0 for a network that hears none."""
+                 embed_latent=128, embed_user=64, embed_voice=64, embed_gaze=16, user_scale=2.0, sound_features=0, embed_sound=64, embed_activity=0):
+        """`sound_features`: features of what is heard in the room, 0 for a network that hears none; `embed_activity`: hidden width of what embeds
+        the activity at rest, 0 for a network that is not told of it."""
         super().__init__()
         self.window, self.head_dim, self.heads, self.user_scale = window_blocks, width // heads, heads, user_scale
         self.tau_width, self.width = tau_width, width
@@ -85,6 +91,10 @@ class FlowNet(nn.Module):
             self.embed_sound = nn.ModuleDict({"0": nn.Linear(sound_width(sound_features), embed_sound), "2": nn.Linear(embed_sound, embed_sound)})
             self.input_sound = nn.Linear(embed_sound + 1, width, bias=False)
             nn.init.zeros_(self.input_sound.weight)
+        self.embed_activity = nn.ModuleDict({"0": nn.Linear(ACTIVITY, embed_activity), "2": nn.Linear(embed_activity, width)}) if embed_activity else None
+        if embed_activity:
+            nn.init.zeros_(self.embed_activity["2"].weight)
+            nn.init.zeros_(self.embed_activity["2"].bias)
         self.tau = nn.ModuleDict({"0": nn.Linear(tau_width, tau_width), "2": nn.Linear(tau_width, tau_width)})
         self.layers = nn.ModuleList(Layer(width, heads, mlp, tau_width) for _ in range(layers))
         self.final = nn.ModuleDict({"mod": nn.Linear(tau_width, 2 * width), "out": nn.Linear(width, latent)})
@@ -108,14 +118,19 @@ class FlowNet(nn.Module):
                 out.append(torch.zeros(*cond.flags.shape[:-1], self.input_sound.in_features, device=cond.flags.device))
             else:
                 out += [self.embed_sound["2"](gelu(self.embed_sound["0"](cond.sound))) * cond.heard, cond.heard]
+        if self.embed_activity:
+            rest = torch.zeros(*cond.flags.shape[:-1], self.width, device=cond.flags.device)
+            out.append(rest if cond.activity is None else self.embed_activity["2"](gelu(self.embed_activity["0"](cond.activity))) * cond.resting)
         return torch.cat(out, -1)
 
     def tokens(self, z, conditioning):
+        """Input of the layers; what sounds and activity say is added to that of the rest."""
         conditioning = conditioning.to(z.dtype)
-        if not self.sound_features:
-            return self.input(torch.cat([self.embed_latent(z), conditioning], -1))
-        usual, sound = conditioning.split([conditioning.shape[-1] - self.input_sound.in_features, self.input_sound.in_features], -1)
-        return self.input(torch.cat([self.embed_latent(z), usual], -1)) + self.input_sound(sound)
+        sound, rest = self.input_sound.in_features if self.sound_features else 0, self.width if self.embed_activity else 0
+        usual, sound, rest = conditioning.split([conditioning.shape[-1] - sound - rest, sound, rest], -1)
+        x = self.input(torch.cat([self.embed_latent(z), usual], -1))
+        x = x + self.input_sound(sound) if self.sound_features else x
+        return x + rest if self.embed_activity else x
 
     def finish(self, x, c):
         shift, scale = self.final["mod"](F.silu(c)).chunk(2, -1)

@@ -29,6 +29,11 @@ def history_time(tau, tau_history=None, clean_from=0.0):
     return tau if tau_history is None or tau < clean_from else max(tau, tau_history)
 
 
+def guides(tau, guided_until=None):
+    """Whether an evaluation at `tau` is guided: those from `guided_until` on are conditional alone, gaze target included."""
+    return guided_until is None or tau < guided_until
+
+
 def reacting(guidance, share, further):
     """Guidance weights [B, T, 1] while what is heard calls for a reaction, by `share` [B, T] 0 to 1: `guidance - 1` grows to `further` times that."""
     return guidance + share[..., None] * (further - 1) * (guidance - 1)
@@ -70,9 +75,9 @@ def midpoint(steps, eps, evaluate):
 class Reference:
     """One session, everything recomputed: tokens' latents, noise and conditions are kept for the whole session."""
 
-    def __init__(self, net, guidance, gaze_guidance, clean=None):
-        """`clean`: (tau_history, clean_from) of `history_time`, or None to impute history throughout."""
-        self.net, self.guidance, self.gaze_guidance, self.clean = net, guidance, gaze_guidance, clean or (None, 0.0)
+    def __init__(self, net, guidance, gaze_guidance, clean=None, guided_until=None):
+        """`clean`: (tau_history, clean_from) of `history_time`, or None to impute history throughout; `guided_until`: see `guides`."""
+        self.net, self.guidance, self.gaze_guidance, self.clean, self.guided_until = net, guidance, gaze_guidance, clean or (None, 0.0), guided_until
         self.z, self.eps, self.cond = [], [], []
 
     def push(self, z, eps, cond):
@@ -94,7 +99,7 @@ class Reference:
             taus[:, -1] = tau
             x1 = self.net(rows, taus, every)[:, -1:]
             seen.append(x1[:, 0])
-            return combine(x1, 3, self.guidance, self.gaze_guidance)
+            return combine(x1, 3, self.guidance, self.gaze_guidance) if guides(tau, self.guided_until) else x1[2:]
 
         return midpoint(steps, eps, evaluate), torch.stack(seen)
 
@@ -111,15 +116,16 @@ class Reference:
 class Stream:
     """Streams `batch` sequences at once. Time of network evaluations is proportional to the rows, not to the history."""
 
-    def __init__(self, net, batch, guidance=1.3, gaze_guidance=2.5, gaze=False, steps=4, tau_history=None, clean_from=0.0, single=False):
+    def __init__(self, net, batch, guidance=1.3, gaze_guidance=2.5, gaze=False, steps=4, tau_history=None, clean_from=0.0, single=False,
+                 guided_until=None):
         """`single`: the network is a single-step student, one branch, history always at `tau_history`. `tau_history`,
-        `clean_from`: see `history_time`."""
+        `clean_from`: see `history_time`; `guided_until`: see `guides`."""
         if single and tau_history is None:
             raise ValueError("a single-step student needs tau_history")
         self.net, self.batch, self.single, self.device = net, batch, single, net.input.weight.device
         self.plan = sampler(steps)
         self.past = lambda tau: history_time(tau, tau_history, 0.0 if single else clean_from)
-        self.guidance, self.gaze_guidance, self.gaze = guidance, gaze_guidance, gaze
+        self.guidance, self.gaze_guidance, self.gaze, self.guided_until = guidance, gaze_guidance, gaze, guided_until
         self.count = 1 if single else (3 if gaze else 2)
         self.taus = [0.0] if single else self.plan.taus
         self.pasts = [[Past() for _ in net.layers] for _ in self.taus]
@@ -178,7 +184,8 @@ class Stream:
             z = rows(eps, 0.0, 0)
         else:
             weight = self.guidance if guidance is None else guidance
-            z = self.plan.run(eps, lambda z, tau, slot: combine(rows(z, tau, slot), self.count, weight, self.gaze_guidance))
+            guided = lambda x1, tau: combine(x1, self.count, weight, self.gaze_guidance) if guides(tau, self.guided_until) else x1[-self.batch:]
+            z = self.plan.run(eps, lambda z, tau, slot: guided(rows(z, tau, slot), tau))
         self.previous = (z, eps, now)
         self.position += 1
         return z

@@ -88,14 +88,14 @@ def apart_loss(net, z, cond, metric, slip, weight, late):
 def load_flow(path, device="cpu"):
     """The averaged flow or student of a checkpoint, and the checkpoint."""
     state = common.load(path)
-    net = FlowNet(state["latent"], state["audio"], **state["size"], sound_features=state.get("sound", 0))
+    net = FlowNet(state["latent"], state["audio"], **state["size"], sound_features=state.get("sound", 0), embed_activity=state.get("activity", 0))
     net.load_state_dict(state["ema"])
     return net.eval().to(device), state
 
 
 def described(state):
     """What a checkpoint of a flow or student holds beside weights: its sizes, the standard of its latents, their metric."""
-    return {k: state[k] for k in ("size", "latent", "audio", "sound", "latent_mean", "latent_std", "metric") if k in state}
+    return {k: state[k] for k in ("size", "latent", "audio", "sound", "activity", "latent_mean", "latent_std", "metric") if k in state}
 
 
 def widened(weights, before, after):

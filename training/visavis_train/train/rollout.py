@@ -56,7 +56,7 @@ def roll(b, batch, target=None, student=False, steps=4, seed=0, guidance=None, g
     stream = Stream(b.student if student else b.flow, n, session["guidance"] if guidance is None else guidance,
                     session["gaze_guidance"] if gaze_guidance is None else gaze_guidance, target is not None, steps,
                     b.config["student"]["tau_history"] if student else tau_history,
-                    clean_from, student)
+                    clean_from, student, session.get("guided_until"))
     heat = bundles.temperature(b.config, student) if temperature is None else temperature
     idle = b.encode(b.idle()[None]).expand(n, -1, -1)
     m = idle.shape[1]

@@ -1,4 +1,6 @@
 """Windows of the cache as training batches for the flow: latents and conditioning, with modality dropout."""
+from dataclasses import replace
+
 import torch
 import torch.nn.functional as F
 
@@ -171,7 +173,7 @@ class Windows:
             heard = heard * (every * (torch.arange(n)[None] >= start).float()[..., None]).to(device)
         flags = cond.flags * keep.to(device)
         flags[..., USER:USER + 1] *= self.seen(size)
-        return z, Condition(user, agent, voice, cond.gaze, flags, sound, heard)
+        return z, replace(cond, user=user, agent=agent, voice=voice, flags=flags, sound=sound, heard=heard)
 
 
 def voices_of(corpus, split, device="cpu", workers=1):
