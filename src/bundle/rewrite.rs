@@ -55,7 +55,7 @@ pub(crate) fn failed(what: impl std::fmt::Display) -> Error {
 
 impl BundleFile<'_> {
     /// The bytes of this bundle with the defaults for sessions, the student's settings and the
-    /// calibration of gaze of `settings`; all else stays.
+    /// calibration of gaze and rest of `settings`; all else stays.
     ///
     /// # Errors
     /// [`ErrorKind::BundleCorrupt`] or [`ErrorKind::BundleInvalid`].
@@ -63,7 +63,7 @@ impl BundleFile<'_> {
         let (json, tensors) = self.raw()?;
         let mut config: serde_json::Value = serde_json::from_str(&json).map_err(failed)?;
         let settings = serde_json::to_value(settings).map_err(failed)?;
-        for key in ["session", "student", "gaze"] {
+        for key in ["session", "student", "gaze", "rest"] {
             match settings.get(key) {
                 Some(value) => config[key] = value.clone(),
                 None => drop(config.as_object_mut().and_then(|config| config.remove(key))),

@@ -91,7 +91,7 @@ def main():
     parser.add_argument("--idle-frames", type=int, default=64)
     parser.add_argument("--idle-from", help="take the idle clip of this bundle")
     parser.add_argument("--half", action="store_true", help="f16 weights")
-    for name in ("guidance", "gaze-guidance", "temperature"):
+    for name in ("guidance", "gaze-guidance", "temperature", "guided-until"):
         parser.add_argument(f"--{name}", type=float, help="default of sessions")
     parser.add_argument("--student-temperature", type=float, help="of sessions on the student [as the others']")
     parser.add_argument("--reaction-guidance", type=float, default=1.0, help="how many times as far guidance goes while a sound is reacted to [1]")
@@ -111,7 +111,7 @@ def main():
         print(f"idle clip from {where}")
     tensors, config = assemble(load_audio(args.audio), args.vae, args.flow, args.student, idle, args.name,
                                credits.licence(args.corpus, *args.sources, data=args.data),
-                               {k: v for k in ("guidance", "gaze_guidance", "temperature") if (v := getattr(args, k)) is not None},
+                               {k: v for k in ("guidance", "gaze_guidance", "temperature", "guided_until") if (v := getattr(args, k)) is not None},
                                load_audio(args.hearing) if args.hearing else None, appraise.load(args.appraisal) if args.appraisal else None)
     if args.hearing:
         config["hearing"]["guidance"] = args.reaction_guidance

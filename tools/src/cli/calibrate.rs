@@ -2,14 +2,14 @@
 //! into its bundle, with other defaults for sessions where they are given.
 
 use super::eval::show;
-use super::values::{GuidanceArgs, temperature};
+use super::values::{GuidanceArgs, flow_time, temperature};
 use super::{files, print};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Mutex;
-use visavis::internals::config::{Config, GazeConfig, ResponseCurve};
+use visavis::internals::config::{Config, GazeConfig, ResponseCurve, RestConfig};
 use visavis::internals::kernels::Kernels;
 use visavis::{BundleFile, Engine, Error, ErrorKind, Result};
 use visavis_tools::eval::{Clip, calibrate, calibrate_rest};
@@ -38,6 +38,9 @@ pub struct CalibrateArgs {
     /// Scale of the noise, 0 to 2 [default: the model's]
     #[arg(long, value_name = "T", value_parser = temperature, allow_negative_numbers = true)]
     pub temperature: Option<f32>,
+    /// Flow time from which evaluations are conditional alone, 0 to 1; 1 guides all [default: the model's]
+    #[arg(long, value_name = "TAU", value_parser = flow_time)]
+    pub guided_until: Option<f32>,
     /// Scale of the noise of the single step, 0 to 2 [default: the model's]
     #[arg(long, value_name = "T", value_parser = temperature, allow_negative_numbers = true)]
     pub student_temperature: Option<f32>,
@@ -50,6 +53,7 @@ impl CalibrateArgs {
         session.guidance = self.weights.guidance.unwrap_or(session.guidance);
         session.gaze_guidance = self.weights.gaze_guidance.unwrap_or(session.gaze_guidance);
         session.temperature = self.temperature.unwrap_or(session.temperature);
+        session.guided_until = self.guided_until.or(session.guided_until).filter(|tau| *tau < 1.0);
         match (&mut config.student, self.student_temperature) {
             (Some(student), Some(t)) => student.temperature = Some(t),
             (None, Some(_)) => {
@@ -73,11 +77,14 @@ pub fn run(args: &CalibrateArgs) -> Result<()> {
     let gaze = calibrate(&engine, &clips, args.windows, args.threads, &|p| show(&stage, p))?;
     let text = summary(args, &gaze);
     settings.gaze = Some(gaze);
-    if settings.rest.is_some() {
+    if let Some(rest) = &settings.rest {
         // Free gaze is part of how a body rests.
-        let file = BundleFile::from_bytes(file.with_settings(&settings)?, &args.input);
-        let engine = Engine::from_file(&file, Kernels::detect()?)?;
-        settings.rest = calibrate_rest(&engine, args.threads, &|p| show(&stage, p))?;
+        let with = |rest: &RestConfig| {
+            let settings = Config { rest: Some(rest.clone()), ..settings.clone() };
+            let file = BundleFile::from_bytes(file.with_settings(&settings)?, &args.input);
+            Engine::from_file(&file, Kernels::detect()?)
+        };
+        settings.rest = Some(calibrate_rest(rest, &with, args.threads, &|p| show(&stage, p))?);
     }
     let bytes = file.with_settings(&settings)?;
     write_atomically(&args.output, |w| w.write_all(&bytes))?;

@@ -41,6 +41,10 @@ pub(super) fn temperature(text: &str) -> Result<f32, String> {
     number(text, 0.0, 2.0)
 }
 
+pub(super) fn flow_time(text: &str) -> Result<f32, String> {
+    number(text, 0.0, 1.0)
+}
+
 pub(super) fn number(text: &str, low: f32, high: f32) -> Result<f32, String> {
     match text.parse() {
         Ok(value) if (low..=high).contains(&value) => Ok(value),

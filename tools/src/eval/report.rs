@@ -45,7 +45,7 @@ impl Report {
         part("Motion (speaking / non-speaking in brackets; FGD cm², FGD_acc (m/s²)², wrists m/s)", &self.motion());
         part("Feet, voice, keypoints (support foot mm/s, APE mm, PCK at 10 cm, bones %)", &self.details());
         part(
-            "At rest, the user stands and nobody speaks (both hands below 3 cm/s; hands and head relative to the hips, m/s, m/s²; a minute; cm in 30 s; power of hand speed by octave from 0.2 to 8 Hz, mm/s)",
+            "At rest, the user stands and nobody speaks (both hands below 3 cm/s; hands and head relative to the hips, m/s, m/s²; a minute; cm in 30 s; shares of stretches of 10 s that are still above 0.95 and below 0.1 of the time; power of hand speed by octave from 0.2 to 8 Hz, mm/s)",
             &self.at_rest(),
         );
         part(
@@ -110,11 +110,12 @@ impl Report {
             let spectrum: Vec<_> = f.hand_spectrum.iter().map(|v| format!("{:.0}", 1000.0 * v)).collect();
             let mut cells = vec![idle.name.clone()];
             cells.extend(lively(f));
-            cells.extend([number(f.sway, 1), number(f.still_stretches, 1), spectrum.join(" ")]);
+            let spells = [f.still_throughout, f.still_never].map(|share| number(share, 2));
+            cells.extend([number(f.sway, 1), number(f.still_stretches, 1), spells.join(" / "), spectrum.join(" ")]);
             cells
         };
         let mut head = LIVELY.to_vec();
-        head.extend(["sway", "still stretches", "spectrum"]);
+        head.extend(["sway", "still stretches", "10 s still / never", "spectrum"]);
         Table::new(&head, self.idle.iter().map(row))
     }
 

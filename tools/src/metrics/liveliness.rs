@@ -18,6 +18,10 @@ const HEAD_HEIGHT: f64 = 1.6;
 const STILL: f64 = 0.03;
 /// Shortest still stretch that counts, frames.
 const LEAST: usize = 6;
+/// Stretches of which it is told whether they are all stillness, or none, frames: 10 s.
+const SPELL: usize = 300;
+/// Shares of a stretch that are still nearly throughout, and nearly never.
+const SHARES: [f64; 2] = [0.95, 0.1];
 /// Rest windows (2 s), sway windows (30 s), windows of the spectra, frames.
 const REST: usize = 60;
 const SWAY: usize = 900;
@@ -48,6 +52,13 @@ pub struct Liveliness {
     pub sway: Option<f64>,
     /// Still stretches of 0.2 s or more, a minute.
     pub still_stretches: Option<f64>,
+    /// Share of stretches of ten seconds that are still nearly throughout (above 0.95), and nearly
+    /// never (below 0.1): people are both, one after the other.
+    #[serde(default)]
+    pub still_throughout: Option<f64>,
+    /// See `still_throughout`.
+    #[serde(default)]
+    pub still_never: Option<f64>,
     /// Root of the power of the hands' speed in each of [`BANDS`], m/s.
     pub hand_spectrum: Vec<f64>,
     /// The same of the head's speed.
@@ -64,6 +75,8 @@ pub struct Tally {
     changes: usize,
     pairs: usize,
     stretches: usize,
+    spells: usize,
+    spent: [usize; 2],
     sway: Vec<f64>,
     spectra: [Vec<Vec<f64>>; 2],
 }
@@ -87,6 +100,12 @@ impl Tally {
         }
         for (from, to) in runs(mask) {
             self.stretches += runs(&still[from..to]).filter(|(a, b)| b - a >= LEAST).count();
+            for spell in still[from..to].chunks_exact(SPELL) {
+                let share = spell.iter().filter(|still| **still).count() as f64 / SPELL as f64;
+                self.spells += 1;
+                self.spent[0] += usize::from(share > SHARES[0]);
+                self.spent[1] += usize::from(share < SHARES[1]);
+            }
             let place = |window: usize, hand: usize| -> DVec3 {
                 let at = from + window * REST;
                 tracks.hands[at..at + REST].iter().map(|h| h.place[hand]).sum::<DVec3>() / REST as f64
@@ -122,6 +141,10 @@ impl Tally {
         self.changes += other.changes;
         self.pairs += other.pairs;
         self.stretches += other.stretches;
+        self.spells += other.spells;
+        for k in 0..2 {
+            self.spent[k] += other.spent[k];
+        }
         self.sway.extend(other.sway);
         for (own, more) in self.spectra.iter_mut().zip(other.spectra) {
             own.extend(more);
@@ -143,6 +166,8 @@ impl Tally {
             rest_changes: a_minute(self.changes, self.pairs * REST),
             sway: share(100.0 * self.sway.iter().sum::<f64>(), self.sway.len()),
             still_stretches: a_minute(self.stretches, self.frames),
+            still_throughout: share(self.spent[0] as f64, self.spells),
+            still_never: share(self.spent[1] as f64, self.spells),
             hand_spectrum: bands(&self.spectra[0]),
             head_spectrum: bands(&self.spectra[1]),
         }
@@ -325,6 +350,8 @@ mod tests {
         assert_eq!((fast.head_speed, fast.sway), (Some(0.0), Some(0.0)));
         close(fast.still_stretches.unwrap(), 4.0, 0.05);
         assert!(fast.rest_changes.unwrap() > 0.0);
+        let third = Some(1.0 / 3.0);
+        assert_eq!((fast.still_never, fast.still_throughout), (third, Some(2.0 / 3.0)), "ten of thirty seconds");
         let slow = hands(0.02);
         assert_eq!((slow.stillness, slow.rest_changes), (Some(1.0), Some(0.0)));
     }
@@ -363,6 +390,7 @@ mod tests {
         both.merge(of(300..600));
         let (both, whole) = (both.row(), of(0..600).row());
         assert_eq!((both.seconds, both.stillness), (whole.seconds, whole.stillness));
+        assert_eq!((both.still_throughout, both.still_never), (Some(0.5), Some(0.5)));
         assert_eq!(of(0..0).row(), Liveliness::default());
     }
 }

@@ -3,7 +3,8 @@
 Definitions: hands (wrists) and head relative to the hips, smoothed by a 9-frame Hann window, lengths scaled to a head
 joint at 1.6 m (the rig's stands at 1.52 m). Both hands are *still* when slower than 3 cm/s. *Rest change*: the mean place of
 a hand over 2 s moves by more than 10 cm from one such window to the next. *Sway*: sum of the standard deviations of
-the hips over the feet, x and z of the hips' heading, in 30 s.
+the hips over the feet, x and z of the hips' heading, in 30 s. *Still throughout*, *never*: share of stretches of 10 s of
+which more than 0.95, less than 0.1 are still.
 """
 import numpy as np
 
@@ -15,6 +16,7 @@ SCALE = HEAD_HEIGHT / rig.rest_positions()[rig.INDEX["head"], 1]
 HANN = np.hanning(11)[1:-1] / np.hanning(11).sum()   # nine taps, none of them zero
 STILL = 0.03
 REST_WINDOW, SWAY_WINDOW, SPECTRUM = 2 * FPS, 30 * FPS, 256
+SPELL, SHARES = 10 * FPS, (0.95, 0.1)                # stretches that are still nearly throughout, or nearly never
 BANDS = (0.2, 0.5, 1.0, 2.0, 4.0, 8.0)               # edges of the spectra's bands [Hz]
 QUANTILES = (0.25, 0.5, 0.75, 0.9)                   # of the still stretches' lengths
 HANDS = [rig.INDEX["leftHand"], rig.INDEX["rightHand"]]
@@ -69,7 +71,7 @@ class Tally:
         self.frames, self.still = 0, 0
         self.sums = {k: [] for k in ("hand_v", "hand_a", "head_v", "head_a")}
         self.changes, self.pairs = 0, 0
-        self.sway, self.lengths = [], []
+        self.sway, self.lengths, self.spells = [], [], []
         self.psd = {"hand": [], "head": []}
 
     def add(self, t, mask=None):
@@ -83,6 +85,7 @@ class Tally:
             out.append(t[k][inner].mean(1) if t[k].ndim > 1 else t[k][inner])
         for a, b in runs(mask):
             self.lengths += [(y - x) / FPS for x, y in runs(still[a:b])]
+            self.spells += [float(still[i: i + SPELL].mean()) for i in range(a, b - SPELL + 1, SPELL)]
             n = (b - a) // REST_WINDOW
             if n > 1:
                 m = t["hands"][a: a + n * REST_WINDOW].reshape(n, REST_WINDOW, 2, 3).mean(1)
@@ -105,6 +108,8 @@ class Tally:
                "rest_changes": self.changes / (self.pairs * REST_WINDOW / FPS / 60) if self.pairs else float("nan"),
                "sway": 100 * mean(self.sway),
                "still_seconds": [float(x) for x in np.quantile(long, QUANTILES)] if len(long) else []}
+        out["still_throughout"] = float(np.mean([x > SHARES[0] for x in self.spells])) if self.spells else float("nan")
+        out["still_never"] = float(np.mean([x < SHARES[1] for x in self.spells])) if self.spells else float("nan")
         out["still_stretches"] = len(long) / (self.frames / FPS / 60) if self.frames else float("nan")   # a minute, 0.2 s or longer
         for k, rows in self.psd.items():
             out[f"{k}_spectrum"] = bands(np.mean(rows, 0)) if rows else []
@@ -121,7 +126,7 @@ def mean_row(tallies):
     """Row of several recordings, each with the same weight whatever its length."""
     rows = [t.row() for t in tallies]
     out = {"seconds": float(sum(r["seconds"] for r in rows))}
-    for k in LEVEL_NAMES + ("head_acceleration",):
+    for k in LEVEL_NAMES + ("head_acceleration", "still_throughout", "still_never"):
         got = np.array([r[k] for r in rows])
         out[k] = float(np.nanmean(got)) if not np.isnan(got).all() else float("nan")
     lengths = np.concatenate([[x for x in t.lengths if x >= 0.2] for t in tallies])

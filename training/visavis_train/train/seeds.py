@@ -13,7 +13,8 @@ MOTION = (("FGD cm²", "all.fgd", 1e4, 0), ("FGD, speaking", "speaking.fgd", 1e4
           ("wrists m/s", "all.wrist_speed", 1, 3), ("speaking / not", "wrist_ratio", 1, 2), ("beat", "all.beat", 1, 3), ("shuffled", "all.beat_shuffled", 1, 3),
           ("head angle", "all.head_angle", 1, 3), ("seam", "all.seam", 1, 2))
 LIVELY = (("both hands still", "stillness", 1, 2), ("hand m/s", "hand_speed", 1, 3), ("hand m/s²", "hand_acceleration", 1, 2), ("head m/s", "head_speed", 1, 3),
-          ("head m/s²", "head_acceleration", 1, 3), ("rest changes a minute", "rest_changes", 1, 1), ("sway cm", "sway", 1, 1), ("still stretches s", "still_stretches", 1, 1))
+          ("head m/s²", "head_acceleration", 1, 3), ("rest changes a minute", "rest_changes", 1, 1), ("sway cm", "sway", 1, 1), ("still stretches s", "still_stretches", 1, 1),
+          ("10 s still throughout", "still_throughout", 1, 2), ("10 s never still", "still_never", 1, 2))
 OCTAVES = tuple((f"octave {i + 1} mm/s", f"hand_spectrum.{i}", 1e3, 0) for i in range(5))
 
 
