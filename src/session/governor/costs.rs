@@ -3,7 +3,7 @@
 //!
 //! A pass over `r` rows counts as `r + 1` rows: reading the weights takes time as well. The shares
 //! were checked against block times of the shipped model: midpoint4, midpoint2 and the single step
-//! stand as 4.4 to 2.6 to 1, measured 3.3 to 2.2 to 1. The governor's headroom covers the
+//! stand as 3.5 to 2.2 to 1, measured 2.7 to 1.8 to 1. The governor's headroom covers the
 //! difference.
 
 use crate::config::Config;
