@@ -352,20 +352,60 @@ pub struct RestConfig {
     pub levels: Vec<[f32; ACTIVITY]>,
     /// Length of such a stretch, seconds.
     pub seconds: f32,
-    /// What the reference network must be told, value by value, to be as active, as `visavis
-    /// calibrate` measured it; none: what is wanted.
+    /// What the reference network must be told to be as active, as `visavis calibrate` measured it;
+    /// none: what is wanted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub reference: Option<[ResponseCurve; ACTIVITY]>,
+    pub reference: Option<RestResponse>,
     /// The same of the student.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub student: Option<[ResponseCurve; ACTIVITY]>,
+    pub student: Option<RestResponse>,
 }
 
 impl RestConfig {
-    /// The curves that there are, by name.
-    pub fn curves(&self) -> impl Iterator<Item = (&'static str, &ResponseCurve)> {
+    /// The responses that there are, by the name of their network.
+    pub fn responses(&self) -> impl Iterator<Item = (&'static str, &RestResponse)> {
         let both = [("reference", &self.reference), ("student", &self.student)];
-        both.into_iter().flat_map(|(name, curves)| curves.iter().flatten().map(move |curve| (name, curve)))
+        both.into_iter().filter_map(|(name, response)| Some((name, response.as_ref()?)))
+    }
+}
+
+/// In whose company a body is at rest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Company {
+    /// A user who is silent.
+    Silent,
+    /// Nobody that it sees.
+    Nobody,
+    /// A user who speaks.
+    Speaking,
+}
+
+/// What a network must be told to be as active at rest as is wanted.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RestResponse {
+    /// Value by value, before a user who is silent.
+    pub curves: [ResponseCurve; ACTIVITY],
+    /// Added to what is wanted where nobody is seen: told the same, a body is not as active there.
+    #[serde(default)]
+    pub alone: [f32; ACTIVITY],
+    /// Added to what is wanted while the user speaks: what a listener has more of than people who
+    /// wait, less what the network does of itself.
+    #[serde(default)]
+    pub listening: [f32; ACTIVITY],
+    /// For how long it is told the same on average, seconds: bodies also move because they are told
+    /// something new.
+    pub seconds: f32,
+}
+
+impl RestResponse {
+    /// What brings `wanted` about.
+    pub fn told(&self, wanted: [f32; ACTIVITY], company: Company) -> [f32; ACTIVITY] {
+        let more = match company {
+            Company::Silent => [0.0; ACTIVITY],
+            Company::Nobody => self.alone,
+            Company::Speaking => self.listening,
+        };
+        std::array::from_fn(|i| self.curves[i].channel(wanted[i] + more[i]))
     }
 }
 

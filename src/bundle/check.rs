@@ -189,7 +189,13 @@ fn rest(r: &RestConfig) -> Result<()> {
     real("rest.seconds", r.seconds, 0.1, 3600.0)?;
     within("rest.levels", r.levels.len(), 1, 4096)?;
     r.levels.as_flattened().iter().try_for_each(|value| real("rest.levels", *value, -4.0, 4.0))?;
-    r.curves().try_for_each(|(name, response)| curve(&format!("rest.{name}"), response, 4.0))
+    r.responses().try_for_each(|(network, response)| {
+        let name = format!("rest.{network}");
+        real(&name, response.seconds, 0.1, 3600.0)?;
+        response.curves.iter().try_for_each(|own| curve(&name, own, 4.0))?;
+        let mut offsets = response.alone.iter().chain(&response.listening);
+        offsets.try_for_each(|offset| real(&name, *offset, -8.0, 8.0))
+    })
 }
 
 /// Bytes that a session takes at most, caches in f32; slots of their own that Euler samplers ask

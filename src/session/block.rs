@@ -97,9 +97,11 @@ impl Block<'_> {
                 let gaze = engine.config.gaze.as_ref();
                 let gaze = options.diagnostics.gaze_control.cue(gaze, options.gaze, plan.sampler, options.seed, *block);
                 let rest = engine.config.rest.as_ref();
-                let drawn = || rest.and_then(|rest| rest::level(rest, plan.sampler, options.seed, *block));
-                let activity = options.diagnostics.activity.filter(|_| rest.is_some()).or_else(drawn);
-                self.outcome = inputs.prepare(*block, &root, (gaze, activity), options.sensitivity, probe);
+                let activity = |company| {
+                    let drawn = |rest| rest::level(rest, plan.sampler, options.seed, *block, company);
+                    rest.and_then(|rest| options.diagnostics.activity.or_else(|| drawn(rest)))
+                };
+                self.outcome = inputs.prepare(*block, &root, (gaze, &activity), options.sensitivity, probe);
                 if self.outcome.is_err() {
                     return;
                 }

@@ -7,7 +7,7 @@ use super::stats::{Delays, InputStats};
 #[cfg(feature = "tract")]
 use crate::audio::TractEncoder;
 use crate::audio::{AudioBackend, AudioEncoder, Speaker, Voice, VoiceInput};
-use crate::config::{ACTIVITY, Config};
+use crate::config::{ACTIVITY, Company, Config};
 use crate::dram::Seen;
 use crate::engine::Engine;
 use crate::error::Result;
@@ -344,12 +344,12 @@ impl Inputs {
     }
 
     /// Makes the conditioning of `block`, for which voices have listened, with the agent's root at
-    /// the end of the block before.
+    /// the end of the block before; `activity` says what a body at rest is told.
     pub(super) fn prepare(
         &mut self,
         block: u64,
         root: &Root,
-        (gaze, activity): (Option<Cue>, Option<[f32; ACTIVITY]>),
+        (gaze, activity): (Option<Cue>, &dyn Fn(Company) -> Option<[f32; ACTIVITY]>),
         sensitivity: f32,
         probe: &mut Option<&mut dyn Probe>,
     ) -> Result<()> {
@@ -377,8 +377,9 @@ impl Inputs {
         if let Some(Cue { value, guided }) = gaze {
             self.condition.set_gaze(value, guided);
         }
-        let rests = self.rest.look(block, self.agent.spoke, user.map(|(_, last)| last), self.reaction());
-        if let Some(level) = activity.filter(|_| rests) {
+        let spoke = [self.agent.spoke, self.user.spoke];
+        let company = self.rest.look(block, spoke, user.map(|(_, last)| last), self.reaction());
+        if let Some(level) = company.and_then(activity) {
             self.condition.set_activity(&level);
             tell(probe, block, "conditioning.activity", &level);
         }

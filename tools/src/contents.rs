@@ -167,6 +167,12 @@ fn networks(c: &Config, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         )?,
         None => writeln!(f, "  gaze     not calibrated: targets are values of the gaze channel (`visavis calibrate`)")?,
     }
+    if let Some(rest) = &c.rest {
+        let calibrated = if rest.reference.is_some() { "calibrated" } else { "not calibrated (`visavis calibrate`)" };
+        let (count, own) = (rest.levels.len(), rest.reference.as_ref());
+        let seconds = own.map_or(rest.seconds, |own| own.seconds);
+        writeln!(f, "  rest     {calibrated}; as active as one of {count} stretches of people, for {seconds:.1} s")?;
+    }
     Ok(())
 }
 

@@ -51,17 +51,17 @@ def test_windows_tell_each_token_of_its_stretch(tmp_path, monkeypatch):
     plain = made_windows(tmp_path, frames=400)
     sums = torch.zeros(2 * 401, 4)
     for clip in range(2):
-        stirs = (torch.arange(400) >= 200).float()
+        stirs = (torch.arange(400) >= 240).float()
         rows = torch.stack([stirs, 0.04 + 0 * stirs, 0.015 + 0 * stirs, torch.ones(400)], 1)
         rows[300:] = 0   # no rest
         sums[401 * clip + 1: 401 * (clip + 1)] = rows.cumsum(0)
     monkeypatch.setattr(activity, "SHORT", 80)
     monkeypatch.setattr(activity, "LONG", 81)
     w = activity.Told(str(tmp_path / "train.pt"), sums, 16, keep=1.0, jitter=False)
-    place = (plain.segments[[0, 0]], torch.tensor([2, 80]))
+    place = (plain.segments[[0, 0]], torch.tensor([20, 80]))
     z, cond = w.batch(2, place)
-    assert cond.resting[0].all() and not cond.resting[1, :, 0].any(), "frames 328 on are no rest"
-    assert torch.equal(cond.activity[0, :, 0], torch.full((16,), -1.0)), "no stretch of the first window reaches frame 200"
+    assert cond.resting[0].all() and not cond.resting[1, :, 0].any(), "frames 300 on are no rest"
+    assert torch.equal(cond.activity[0, :, 0], torch.full((16,), -1.0)), "no stretch of the first window reaches frame 240"
     assert cond.activity[0, :, 1:].abs().max() < 1e-3
     dropped = activity.Told(str(tmp_path / "train.pt"), sums, 16, keep=0.0).batch(4)[1]
     assert not dropped.resting.any()

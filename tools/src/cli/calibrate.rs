@@ -9,7 +9,7 @@ use clap::builder::RangedU64ValueParser;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Mutex;
-use visavis::internals::config::{Config, GazeConfig, ResponseCurve, RestConfig};
+use visavis::internals::config::{Config, GazeConfig, ResponseCurve, RestConfig, RestResponse};
 use visavis::internals::kernels::Kernels;
 use visavis::{BundleFile, Engine, Error, ErrorKind, Result};
 use visavis_tools::eval::{Clip, calibrate, calibrate_rest};
@@ -75,7 +75,7 @@ pub fn run(args: &CalibrateArgs) -> Result<()> {
     let clips = Clip::list(&args.clips, &engine.config().rig)?;
     let stage = Mutex::new(String::new());
     let gaze = calibrate(&engine, &clips, args.windows, args.threads, &|p| show(&stage, p))?;
-    let text = summary(args, &gaze);
+    let mut text = summary(args, &gaze);
     settings.gaze = Some(gaze);
     if let Some(rest) = &settings.rest {
         // Free gaze is part of how a body rests.
@@ -84,7 +84,9 @@ pub fn run(args: &CalibrateArgs) -> Result<()> {
             let file = BundleFile::from_bytes(file.with_settings(&settings)?, &args.input);
             Engine::from_file(&file, Kernels::detect()?)
         };
-        settings.rest = Some(calibrate_rest(rest, &with, args.threads, &|p| show(&stage, p))?);
+        let rest = calibrate_rest(rest, &clips, &with, args.threads, &|p| show(&stage, p))?;
+        text += &rest_summary(&rest);
+        settings.rest = Some(rest);
     }
     let bytes = file.with_settings(&settings)?;
     write_atomically(&args.output, |w| w.write_all(&bytes))?;
@@ -101,4 +103,17 @@ fn summary(args: &CalibrateArgs, gaze: &GazeConfig) -> String {
     let levels: Vec<_> = gaze.levels.iter().map(|l| format!("{l:.2}")).collect();
     let _ = writeln!(text, "  free      stretches of {:.1} s at {}", gaze.seconds, levels.join(" "));
     text
+}
+
+/// What the networks are asked for at rest beside the stretches of people: stirring, hands, head.
+fn rest_summary(rest: &RestConfig) -> String {
+    let offsets = |values: &[f32]| values.iter().map(|v| format!("{v:+.2}")).collect::<Vec<_>>().join(" ");
+    let line = |(name, response): (&str, &RestResponse)| {
+        let (alone, listening) = (offsets(&response.alone), offsets(&response.listening));
+        format!(
+            "  rest      {name}: told the same for {:.1} s; alone {alone}   listening {listening}\n",
+            response.seconds
+        )
+    };
+    rest.responses().map(line).collect()
 }

@@ -2,9 +2,14 @@
 
 use super::EvalProgress;
 use super::calibrate::ascending;
-use super::people::{self, Idle};
+use super::clip::Clip;
+use super::motion;
+use super::parallel::each;
+use super::people::{self, Idle, Real};
+use super::window::{LEAD, Window};
+use crate::metrics::{Liveliness, Tally};
 use std::sync::Arc;
-use visavis::internals::config::{ACTIVITY, ResponseCurve, RestConfig};
+use visavis::internals::config::{ACTIVITY, RestConfig, RestResponse};
 use visavis::internals::session::Diagnostics;
 use visavis::{Engine, Result, Sampler, SessionOptions};
 
@@ -14,69 +19,148 @@ const STIRRING: [f32; 9] = [-1.0, -0.85, -0.65, -0.4, -0.15, 0.1, 0.4, 0.7, 1.0]
 const NEAR: f32 = 0.15;
 /// Sessions of a point, and the seconds of each.
 const SESSIONS: (usize, usize) = (8, 40);
-/// Times that the curves are shifted.
-const SHIFTS: usize = 2;
+/// Sessions in which the whole is set right: of a quarter as many hand speed is known to a tenth.
+const LONG: (usize, usize) = (16, 120);
+/// Windows of the clips, at most, in which listeners are looked for.
+const WINDOWS: usize = 160;
+/// By how much the time for which a body is told the same grows in a round at most, and its limits,
+/// seconds.
+const LONGER: f64 = 1.4;
+const HELD: [f32; 2] = [5.0, 40.0];
+/// Times that sessions are brought nearer to what is wanted.
+const ROUNDS: usize = 3;
 
 /// Measures how active a model's body is as a function of what it is told, for both its networks,
 /// along the line on which the stretches of real people lie. Bodies also stir because they are told
-/// something else: the curves are then shifted until sessions are as active as people on average,
-/// half of them before a user and half alone. `with` makes an engine of the model with curves; what
-/// `rest` holds of them makes no difference.
+/// something else: what is asked of them is then shifted until sessions are as active as people on
+/// average before a user who is silent and alone, and as the agents of `clips` are who listen; and
+/// they are told the same for so long that their hands change their place as often as people's.
+/// `with` makes an engine of the model with responses; what `rest` holds of them makes no
+/// difference.
 ///
 /// # Errors
-/// Those of sessions and of `with`; [`visavis::ErrorKind::Argument`] for a model that does not do
-/// what it is told.
+/// Those of clips, of sessions and of `with`; [`visavis::ErrorKind::Argument`] for a model that does
+/// not do what it is told.
 pub fn calibrate_rest(
     rest: &RestConfig,
+    clips: &[Clip],
     with: &dyn Fn(&RestConfig) -> Result<Arc<Engine>>,
     threads: usize,
     progress: &(dyn Fn(EvalProgress<'_>) + Sync),
 ) -> Result<RestConfig> {
     let mut rest = RestConfig { reference: None, student: None, ..rest.clone() };
     let engine = with(&rest)?;
-    let curves = |name: &str, sampler: Sampler| -> Result<[ResponseCurve; ACTIVITY]> {
-        let mut points = [const { Vec::new() }; ACTIVITY];
-        for (i, stirring) in STIRRING.into_iter().enumerate() {
-            progress(EvalProgress { stage: &format!("{name}, activity"), done: i + 1, total: STIRRING.len() });
-            let told = along(&rest.levels, stirring);
-            let diagnostics = Diagnostics { activity: Some(told), ..Default::default() };
-            let options = SessionOptions { sampler, diagnostics, ..Default::default() };
-            let done = measured(&Idle::of_sessions(&engine, &options, true, threads, SESSIONS)?);
-            (0..ACTIVITY).for_each(|k| points[k].push([done[k], told[k]]));
-        }
-        // What the network is told must ascend with what it does, value by value.
-        let ascends = |points: &mut Vec<[f32; 2]>| {
-            points.sort_by(|a, b| a[1].total_cmp(&b[1]));
-            points.dedup_by(|b, a| b[1] - a[1] < 1e-3);
-        };
-        points.iter_mut().for_each(ascends);
-        let [stirring, hands, head] = &points;
-        let curve = |points: &[_]| ascending(points, name);
-        Ok([curve(stirring)?, curve(hands)?, curve(head)?])
+    let listeners = Listeners::of(&engine, clips)?;
+    let response = |name: &str, sampler: Sampler| -> Result<RestResponse> {
+        let told = |i| progress(EvalProgress { stage: &format!("{name}, activity"), done: i, total: STIRRING.len() });
+        let curves = curves(&engine, &rest.levels, sampler, threads, &told)?;
+        let [stirring, hands, head] = curves.each_ref().map(|points| ascending(points, name));
+        let (none, seconds) = ([0.0; ACTIVITY], rest.seconds);
+        Ok(RestResponse { curves: [stirring?, hands?, head?], alone: none, listening: none, seconds })
     };
-    let reference = Some(curves("reference", SessionOptions::default().sampler)?);
-    let student = engine.config().student.map(|_| curves("student", Sampler::Single)).transpose()?;
+    let reference = Some(response("reference", SessionOptions::default().sampler)?);
+    let student = engine.config().student.map(|_| response("student", Sampler::Single)).transpose()?;
     (rest.reference, rest.student) = (reference, student);
-    let wanted = mean(&rest.levels);
-    for i in 0..SHIFTS {
-        progress(EvalProgress { stage: "sessions at rest", done: i + 1, total: SHIFTS });
+    let (wanted, people) = (mean(&rest.levels), Real::read()?.idle.rest_changes);
+    for i in 0..ROUNDS {
+        progress(EvalProgress { stage: "sessions at rest", done: i + 1, total: ROUNDS });
         let engine = with(&rest)?;
-        let excess = |sampler: Sampler| -> Result<[f32; ACTIVITY]> {
-            let options = SessionOptions { sampler, ..Default::default() };
-            let rows = [true, false].map(|seen| Idle::of_sessions(&engine, &options, seen, threads, people::SESSIONS));
-            let [seen, alone] = rows;
-            let done = mean(&[measured(&seen?), measured(&alone?)]);
-            Ok(std::array::from_fn(|k| done[k] - wanted[k]))
-        };
         let samplers = [SessionOptions::default().sampler, Sampler::Single];
-        for (curves, sampler) in [&mut rest.reference, &mut rest.student].into_iter().zip(samplers) {
-            let Some(curves) = curves else { continue };
-            for (curve, excess) in curves.iter_mut().zip(excess(sampler)?) {
-                curve.0.iter_mut().for_each(|[done, _]| *done += excess);
+        for (response, sampler) in [&mut rest.reference, &mut rest.student].into_iter().zip(samplers) {
+            let Some(response) = response else { continue };
+            let options = SessionOptions { sampler, ..Default::default() };
+            let idle = |seen| Idle::of_sessions(&engine, &options, seen, threads, LONG);
+            let missing = |done: &Liveliness| less(wanted, measured(done));
+            let (seen, alone) = (idle(true)?.figures, idle(false)?.figures);
+            let silent = missing(&seen);
+            for (curve, missing) in response.curves.iter_mut().zip(silent) {
+                curve.0.iter_mut().for_each(|[done, _]| *done -= missing);
+            }
+            // The curves have moved for these too.
+            response.alone = plus(response.alone, less(missing(&alone), silent));
+            if let (Some(seen), Some(alone), Some(people)) = (seen.rest_changes, alone.rest_changes, people) {
+                let longer = (0.5 * (seen + alone) / people).clamp(1.0 / LONGER, LONGER);
+                response.seconds = (response.seconds * longer as f32).clamp(HELD[0], HELD[1]);
+            }
+            if let Some(missing) = listeners.missing(&engine, &options, threads)? {
+                response.listening = plus(response.listening, less(missing, silent));
             }
         }
     }
     Ok(rest)
+}
+
+/// What a body before a silent user does as it is told: points (done, told) of each value, ascending
+/// by what is told.
+fn curves(
+    engine: &Arc<Engine>,
+    levels: &[[f32; ACTIVITY]],
+    sampler: Sampler,
+    threads: usize,
+    progress: &dyn Fn(usize),
+) -> Result<[Vec<[f32; 2]>; ACTIVITY]> {
+    let mut points = [const { Vec::new() }; ACTIVITY];
+    for (i, stirring) in STIRRING.into_iter().enumerate() {
+        progress(i + 1);
+        let told = along(levels, stirring);
+        let diagnostics = Diagnostics { activity: Some(told), ..Default::default() };
+        let options = SessionOptions { sampler, diagnostics, ..Default::default() };
+        let done = measured(&Idle::of_sessions(engine, &options, true, threads, SESSIONS)?.figures);
+        (0..ACTIVITY).for_each(|k| points[k].push([done[k], told[k]]));
+    }
+    for points in &mut points {
+        points.sort_by(|a, b| a[1].total_cmp(&b[1]));
+        points.dedup_by(|b, a| b[1] - a[1] < 1e-3);
+    }
+    Ok(points)
+}
+
+/// Windows in which agents listen, and what they do meanwhile.
+struct Listeners {
+    windows: Vec<(Window, Vec<bool>)>,
+    done: Liveliness,
+}
+
+impl Listeners {
+    fn of(engine: &Engine, clips: &[Clip]) -> Result<Self> {
+        let rig = &engine.config().rig;
+        let windows = Window::choose(clips, WINDOWS)?.into_iter().filter_map(|window| {
+            let mask = people::listening(&window.segment).split_off(LEAD);
+            mask.contains(&true).then_some((window, mask))
+        });
+        let windows: Vec<_> = windows.collect();
+        let mut tally = Tally::default();
+        windows.iter().for_each(|(window, mask)| tally.add(rig, &window.truth.frames, mask));
+        Ok(Self { windows, done: tally.row() })
+    }
+
+    /// What sessions in the same windows lack of their activity; nothing where nobody listens.
+    fn missing(
+        &self,
+        engine: &Arc<Engine>,
+        options: &SessionOptions,
+        threads: usize,
+    ) -> Result<Option<[f32; ACTIVITY]>> {
+        let tallies = each(threads, self.windows.len(), &|_| {}, &|i| {
+            let (window, mask) = &self.windows[i];
+            let options = SessionOptions { seed: options.seed + i as u64, ..options.clone() };
+            let mut tally = Tally::default();
+            tally.add(&engine.config().rig, &motion::in_window(engine, &options, window)?, mask);
+            Ok(tally)
+        })?;
+        let mut all = Tally::default();
+        tallies.into_iter().for_each(|tally| all.merge(tally));
+        let done = all.row();
+        Ok((done.seconds > 0.0).then(|| less(measured(&self.done), measured(&done))))
+    }
+}
+
+fn plus(a: [f32; ACTIVITY], b: [f32; ACTIVITY]) -> [f32; ACTIVITY] {
+    std::array::from_fn(|i| a[i] + b[i])
+}
+
+fn less(a: [f32; ACTIVITY], b: [f32; ACTIVITY]) -> [f32; ACTIVITY] {
+    std::array::from_fn(|i| a[i] - b[i])
 }
 
 /// Activity of all of `levels` one after the other: shares and speeds are averaged, not their
@@ -95,8 +179,7 @@ fn along(levels: &[[f32; ACTIVITY]], stirring: f32) -> [f32; ACTIVITY] {
 }
 
 /// Activity of a body at rest (`training/visavis_train/train/activity.py`).
-fn measured(idle: &Idle) -> [f32; ACTIVITY] {
-    let figures = &idle.figures;
+fn measured(figures: &Liveliness) -> [f32; ACTIVITY] {
     let speed = |v: Option<f64>, least: f64, middle: f64| (v.unwrap_or(0.0).max(least) / middle).log2();
     let stirring = 1.0 - figures.stillness.unwrap_or(1.0);
     let hands = speed(figures.hand_speed, 0.002, 0.04) / 3.0;
@@ -106,7 +189,6 @@ fn measured(idle: &Idle) -> [f32; ACTIVITY] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::metrics::Liveliness;
 
     #[test]
     fn points_lie_among_the_levels() {
@@ -133,7 +215,7 @@ mod tests {
             head_speed: Some(0.03),
             ..Liveliness::default()
         };
-        let [stirring, hands, head] = measured(&Idle { name: String::new(), figures });
+        let [stirring, hands, head] = measured(&figures);
         assert_eq!(stirring, 0.5);
         assert!((hands - 1.0 / 3.0).abs() < 1e-6 && (head - 0.5).abs() < 1e-6);
     }

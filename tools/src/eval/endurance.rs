@@ -3,7 +3,7 @@
 use super::figures::mean;
 use super::motion::generate;
 use super::parallel::each;
-use super::window::{LEAD, Window};
+use super::window::Window;
 use crate::metrics::{Summary, mean_and_error2};
 use crate::recording::Recording;
 use glam::Vec3;
@@ -15,7 +15,10 @@ use visavis::{Engine, FPS, Frame, Result, Root, SessionOptions};
 
 /// Sessions that are averaged: single minutes differ by a third in how far feet slide, so few of
 /// them tell nothing.
-const RUNS: usize = 16;
+const RUNS: usize = 32;
+/// Seconds that lead in, which are the end of a period: the user is on the way and the agent after
+/// it when a period begins, the first one too.
+const LEAD_IN: usize = 20;
 /// Users who walk away and come back.
 const WALKS: usize = 4;
 /// The gaze target of a long run: free gaze changes its level by chance every few seconds, which
@@ -108,19 +111,21 @@ impl Endurance {
         quick: bool,
     ) -> Result<Self> {
         let (period, periods, runs) = if quick { (20, 3, 1) } else { (60, 10, RUNS) };
-        let length = period * FPS as usize;
+        let (length, lead) = (period * FPS as usize, LEAD_IN * FPS as usize);
         let results = each(threads, runs, &|_| {}, &|run| {
-            let voices = voices(windows, [run, runs], length).map(|voice| Some(voice.repeat(periods)));
-            let user: Vec<Vec3> = (0..length * periods).map(|i| circling(i % length, length)).collect();
+            let late = length - lead;
+            let again = |voice: Vec<f32>| Some([&voice[late * FRAME_SAMPLES..], &voice.repeat(periods)].concat());
+            let voices = voices(windows, [run, runs], length).map(again);
+            let user: Vec<Vec3> = (late..length * (periods + 1)).map(|i| circling(i % length, length)).collect();
             let options =
                 SessionOptions { start: Root::default(), seed: run as u64, gaze: Some(GAZE), ..options.clone() };
             let outcome = generate(engine, options, voices, user, None)?;
-            Ok(Run { guard: outcome.stats.guard, ..Run::of(&outcome.recording, length) })
+            Ok(Run { guard: outcome.stats.guard, ..Run::of(&outcome.recording, lead, length) })
         })?;
         let (trips, held) =
             results.iter().fold((0, 0), |(trips, held), run| (trips + run.guard.trips, held + run.guard.held_frames));
         let guard = GuardStats { trips, held_frames: held, ..GuardStats::default() };
-        let frames = runs * periods * length;
+        let frames = runs * (lead + periods * length);
         let metric = |(name, value, least): &Metric| {
             let of = |run: &Run| run.periods.iter().map(value).collect::<Option<Vec<_>>>();
             let values: Vec<_> = results.iter().filter_map(of).collect();
@@ -135,7 +140,7 @@ impl Endurance {
             runs,
             changes: METRICS.iter().filter_map(metric).collect(),
             finite: results.iter().all(|run| run.finite),
-            trips_a_minute: trips as f64 * 60.0 / (runs * period * periods) as f64,
+            trips_a_minute: trips as f64 * 60.0 * f64::from(FPS) / frames as f64,
             held: held as f64 / frames as f64,
             defective: guard.is_defective(frames as u64),
             wandered: results.iter().map(|run| run.wandered).sum::<f64>() / runs as f64,
@@ -151,7 +156,8 @@ struct Run {
 }
 
 impl Run {
-    fn of(recording: &Recording, length: usize) -> Self {
+    /// Of periods of `length` frames, which `lead` frames lead in.
+    fn of(recording: &Recording, lead: usize, length: usize) -> Self {
         let frames = recording.frames.as_slice();
         let part = |from: usize, to: usize| {
             let voice = |v: &Option<Vec<f32>>| v.as_ref().map(|v| v[from * FRAME_SAMPLES..to * FRAME_SAMPLES].to_vec());
@@ -166,8 +172,8 @@ impl Run {
             })
         };
         let last = frames.len() - length;
-        // Each without its first seconds: the session's start, from the idle clip, belongs to none.
-        let periods = (0..frames.len() / length).map(|i| part(i * length + LEAD, (i + 1) * length)).collect();
+        let periods = (0..(frames.len() - lead) / length).map(|i| lead + i * length);
+        let periods = periods.map(|from| part(from, from + length)).collect();
         let finite = |f: &Frame| f.global.iter().all(|t| t.position.is_finite() && t.rotation.is_finite());
         let away = |f: &Frame| f.root.x.hypot(f.root.z);
         Self {

@@ -24,6 +24,8 @@ pub(super) const FEW: (usize, usize) = (1, 20);
 const PAUSE: usize = 18;
 /// A user whose head is slower than this stands, m/s.
 const STANDS: f32 = 0.25;
+/// A voice is silent after this long, frames.
+const SILENT: usize = 32;
 /// In an idle frame nobody has spoken or moved for this long, nor will, frames.
 const QUIET: usize = 2 * FPS as usize;
 
@@ -120,6 +122,15 @@ pub(super) fn alone(name: &str) -> String {
     format!("{name}, nobody seen")
 }
 
+/// Frames in which the user speaks, has within a second, and the agent has not: what a session
+/// knows of a listener.
+pub(super) fn listening(segment: &Segment) -> Vec<bool> {
+    let n = segment.frames.len();
+    let (agent, user) = (speech(segment.agent(), n), speech(segment.user(), n));
+    let lately = |mask: &[bool], i: usize| mask[(i + 1).saturating_sub(SILENT)..=i].contains(&true);
+    (0..n).map(|i| !lately(&agent, i) && lately(&user, i)).collect()
+}
+
 /// Frames in which nobody speaks, nor does within two seconds, and the user stands.
 fn idle(segment: &Segment) -> Vec<bool> {
     let n = segment.frames.len();
@@ -172,6 +183,13 @@ mod tests {
             agent_voice: Some(voice.iter().map(sample).collect()),
             user_voice: None,
         };
+        // Speech from frame 50 to 120, of the agent, then of the user.
+        assert!(!listening(&segment).contains(&true), "nobody to listen to");
+        let heard = Segment { user_voice: segment.agent_voice.clone(), agent_voice: None, ..segment.clone() };
+        let listens = listening(&heard);
+        assert!(!listens[40] && listens[60] && listens[85] && listens[150] && !listens[160], "{listens:?}");
+        let both = Segment { user_voice: segment.agent_voice.clone(), ..segment.clone() };
+        assert!(!listening(&both).contains(&true), "it speaks itself");
         let idle = idle(&segment);
         assert!(!idle[10] && idle[200] && !idle[70] && !idle[135] && !idle[260] && !idle[350], "{idle:?}");
     }

@@ -22,6 +22,7 @@ use super::Voices;
 use glam::Vec3;
 use serde::Serialize;
 use std::sync::Arc;
+use visavis::internals::config::ACTIVITY;
 use visavis::internals::frame::BLOCK_SAMPLES;
 use visavis::internals::nn::PERIOD;
 use visavis::internals::session::{Anchoring, Diagnostics};
@@ -100,6 +101,13 @@ fn quieten(session: &mut Session, blocks: usize, seed: u64) -> Result<()> {
     session.reset_with_noise(noise)
 }
 
+/// A session from `first_block` on in which nothing is drawn by the hour: free gaze and the activity
+/// of a body at rest would be.
+fn options(sampler: Sampler, first_block: u64, anchoring: Anchoring) -> SessionOptions {
+    let diagnostics = Diagnostics { first_block, anchoring, activity: Some([0.0; ACTIVITY]), ..Default::default() };
+    SessionOptions { sampler, gaze: Some(0.8), diagnostics, ..Default::default() }
+}
+
 /// The beginning of a voice.
 fn beginning(voice: &[f32], samples: usize) -> &[f32] {
     &voice[..samples.min(voice.len())]
@@ -107,9 +115,7 @@ fn beginning(voice: &[f32], samples: usize) -> &[f32] {
 
 /// Motion from `first_block` on, of a conversation with a user who walks.
 fn talk(engine: &Arc<Engine>, voices: &Voices, sampler: Sampler, first_block: u64) -> Result<Vec<Frame>> {
-    let diagnostics = Diagnostics { first_block, anchoring: Anchoring::Every(8), ..Default::default() };
-    let options = SessionOptions { sampler, gaze: Some(0.8), diagnostics, ..Default::default() };
-    let mut session = engine.session(options)?;
+    let mut session = engine.session(options(sampler, first_block, Anchoring::Every(8)))?;
     quieten(&mut session, BLOCKS, 7)?;
     session.push_agent_audio(beginning(voices.agent(), BLOCKS * BLOCK_SAMPLES), 24_000)?;
     session.push_user_audio(beginning(voices.user(), 2 * BLOCKS * BLOCK_SAMPLES), 48_000)?;
@@ -130,8 +136,7 @@ fn talk(engine: &Arc<Engine>, voices: &Voices, sampler: Sampler, first_block: u6
 /// The first block at `first_block` under several noises: its history is the bundle's idle clip,
 /// whenever it is.
 fn single_blocks(engine: &Arc<Engine>, voices: &Voices, sampler: Sampler, first_block: u64) -> Result<Vec<Frame>> {
-    let diagnostics = Diagnostics { first_block, ..Default::default() };
-    let mut session = engine.session(SessionOptions { sampler, diagnostics, ..Default::default() })?;
+    let mut session = engine.session(options(sampler, first_block, Anchoring::Bundle))?;
     let mut frames = Vec::new();
     for seed in 0..NOISES {
         quieten(&mut session, 1, seed)?;

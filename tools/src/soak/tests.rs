@@ -2,8 +2,12 @@ use super::*;
 use crate::offline::Wav;
 use visavis::Sampler;
 
+fn golden(name: &str) -> Arc<Engine> {
+    Engine::load(format!("{}/../tests/goldens/{name}.safetensors", env!("CARGO_MANIFEST_DIR"))).unwrap()
+}
+
 fn tiny() -> Arc<Engine> {
-    Engine::load(concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/goldens/tiny.safetensors")).unwrap()
+    golden("tiny")
 }
 
 fn voices() -> Voices {
@@ -29,6 +33,14 @@ fn a_short_soak_measures_everything() {
     let names: Vec<_> = report.verdicts.iter().map(|v| v.name.as_str()).collect();
     assert!(names.ends_with(&["period", "precision", "switches", "guard"]), "{names:?}");
     assert!(serde_json::to_string(&report).unwrap().contains("\"verdicts\""));
+}
+
+/// What is drawn by the hour, gaze and activity at rest, is no difference that the hour makes.
+#[test]
+fn what_is_drawn_is_left_out_of_what_the_hour_changes() {
+    let silence = Voices::new(vec![0.0; 48_000], vec![0.0; 48_000]).unwrap();
+    let hours = Hours::measure(&golden("rest"), &silence, Sampler::Midpoint1).unwrap();
+    assert_eq!(hours.period_frames_that_differ, 0, "{hours:?}");
 }
 
 /// The model that is shipped, on the sample conversation, up and down the ladder: 40 switches, the

@@ -35,7 +35,6 @@ QUIET = 32        # frames since the agent last spoke, from which on it is at re
 STANDS = 0.25     # metres that a user who stands moves by in as many frames, at most
 HIDDEN = 64
 STRETCH = 10.0    # seconds of a stretch of people
-HELD = 15.0       # seconds for which sessions hold a level: bodies move at each change, and as often as people so
 SHORT, LONG = 180, 420  # frames of a stretch
 
 
@@ -162,7 +161,7 @@ def graft(source, flow, table, out):
     way = {k: v.half() for k, v in flow.items() if k.startswith("embed_activity.")}
     for net in ("flow", "student") if config.get("student") else ("flow",):
         tensors |= {f"{net}.{k}": v.clone() for k, v in way.items()}
-    config["rest"] = {"embed": HIDDEN, "levels": [[round(v, 4) for v in row] for row in table.tolist()], "seconds": HELD}
+    config["rest"] = {"embed": HIDDEN, "levels": [[round(v, 4) for v in row] for row in table.tolist()], "seconds": STRETCH}
     save_file(tensors, out, metadata={bundles.KEY: json.dumps(config)})
 
 
