@@ -48,7 +48,7 @@ packages() {
 venv=${VISAVIS_VENV:-$cache/venv}
 python=$venv/bin/python
 python_environment() {
-  "$python" -c 'import torch, numpy, scipy, safetensors, soundfile, matplotlib, pytest' 2>/dev/null && return
+  "$python" -c 'import torch, numpy, scipy, safetensors, matplotlib, pytest' 2>/dev/null && return
   python3 -m venv "$venv"
   "$venv/bin/pip" install --quiet './training[test]'
   # The checkout is what is tested, not the copy that came with its dependencies.

@@ -5,6 +5,7 @@ use super::figures::median;
 use super::motion::generate;
 use super::parallel::each;
 use super::window::Window;
+use crate::metrics::head_angle;
 use glam::{Vec2, Vec3};
 use serde::Serialize;
 use std::sync::Arc;
@@ -42,6 +43,9 @@ pub struct Reaction {
 /// A jump in a clip: six seconds that lead to it and three after it.
 struct Event {
     segment: Segment,
+    /// Gaze score of the corpus' agent in those six seconds. Sessions are asked for the same: left
+    /// free, some would be of agents who avoid the user's eyes, and those are not looked for here.
+    gaze: Option<f32>,
 }
 
 impl Reaction {
@@ -61,9 +65,10 @@ impl Reaction {
         let time = |frames: &[Frame], user: &[Vec3]| time(rig, &frames[BEFORE..], &user[BEFORE..]);
         let truth: Vec<f64> = events.iter().map(|e| time(&e.segment.frames, &e.segment.user)).collect();
         let model = each(threads, events.len(), &|_| {}, &|i| {
-            let Segment { frames, user, user_rotation, .. } = &events[i].segment;
-            let options = SessionOptions { start: frames[0].root, seed: i as u64, ..options.clone() };
-            let voices = [events[i].segment.agent(), events[i].segment.user()];
+            let Event { segment, gaze } = &events[i];
+            let Segment { frames, user, user_rotation, .. } = segment;
+            let options = SessionOptions { start: frames[0].root, seed: i as u64, gaze: *gaze, ..options.clone() };
+            let voices = [segment.agent(), segment.user()];
             let motion = generate(engine, options, voices, user.iter().copied(), user_rotation.as_deref())?;
             Ok(time(&motion.recording.frames, user))
         })?;
@@ -113,7 +118,13 @@ fn events(rig: &Rig, clips: &[Clip], most: usize) -> Result<Vec<Event>> {
     }
     let count = found.len().min(most);
     let chosen = (0..count).map(|k| found[(2 * k + 1) * found.len() / (2 * count)]);
-    chosen.map(|(c, i)| Ok(Event { segment: clips[c].read(i - BEFORE, BEFORE + AFTER)? })).collect()
+    let event = |(c, i): (usize, usize)| {
+        let segment = clips[c].read(i - BEFORE, BEFORE + AFTER)?;
+        let before = segment.cut(0, BEFORE);
+        let score = head_angle(&before.recording(rig, before.frames.clone()));
+        Ok(Event { segment, gaze: score.map(|score| score.clamp(0.0, 1.0) as f32) })
+    };
+    chosen.map(event).collect()
 }
 
 /// Seconds from the first frame until the head has found the user.
