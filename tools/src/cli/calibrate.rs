@@ -27,7 +27,8 @@ pub struct CalibrateArgs {
     #[arg(long, value_name = "DIR|FILE")]
     pub clips: PathBuf,
     /// Most windows of 13.3 s, spread over the clips, that the model is tried on; free gaze takes
-    /// after all that the clips have
+    /// after all that the clips have. As many minutes of each silence at rest, and five times as
+    /// many windows in which agents listen
     #[arg(long, value_name = "N", default_value = "32", value_parser = RangedU64ValueParser::<usize>::new().range(1..=100_000))]
     pub windows: usize,
     /// Threads, each on windows of its own; the result is the same
@@ -84,7 +85,7 @@ pub fn run(args: &CalibrateArgs) -> Result<()> {
             let file = BundleFile::from_bytes(file.with_settings(&settings)?, &args.input);
             Engine::from_file(&file, Kernels::detect()?)
         };
-        let rest = calibrate_rest(rest, &clips, &with, args.threads, &|p| show(&stage, p))?;
+        let rest = calibrate_rest(rest, &clips, args.windows, &with, args.threads, &|p| show(&stage, p))?;
         text += &rest_summary(&rest);
         settings.rest = Some(rest);
     }

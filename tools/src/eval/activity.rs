@@ -17,16 +17,16 @@ use visavis::{Engine, Result, Sampler, SessionOptions};
 const STIRRING: [f32; 9] = [-1.0, -0.85, -0.65, -0.4, -0.15, 0.1, 0.4, 0.7, 1.0];
 /// Stretches whose stirring differs by so much count for a point by a third.
 const NEAR: f32 = 0.15;
-/// Sessions of a point, and the seconds of each.
-const SESSIONS: (usize, usize) = (8, 40);
-/// Sessions in which the whole is set right: of a quarter as many hand speed is known to a tenth.
-const LONG: (usize, usize) = (16, 120);
-/// Windows of the clips, at most, in which listeners are looked for.
-const WINDOWS: usize = 160;
+/// Seconds of a session of a point, and of one in which the whole is set right.
+const SHORT: usize = 40;
+const LONG: usize = 120;
 /// By how much the time for which a body is told the same grows in a round at most, and its limits,
 /// seconds.
 const LONGER: f64 = 1.4;
 const HELD: [f32; 2] = [5.0, 40.0];
+/// Largest offset: it takes any level to an end of the curves, and what that does not reach is out of
+/// reach.
+const MOST: f32 = 2.0;
 /// Times that sessions are brought nearer to what is wanted.
 const ROUNDS: usize = 3;
 
@@ -35,8 +35,11 @@ const ROUNDS: usize = 3;
 /// something else: what is asked of them is then shifted until sessions are as active as people on
 /// average before a user who is silent and alone, and as the agents of `clips` are who listen; and
 /// they are told the same for so long that their hands change their place as often as people's.
-/// `with` makes an engine of the model with responses; what `rest` holds of them makes no
-/// difference.
+///
+/// Listeners are looked for in `5 windows` windows of the clips at most; there are `windows / 4`
+/// silent sessions of 40 s for each of nine points, and in each of three rounds `windows / 2` of two
+/// minutes with a user and as many without: with 32, hand speed is known to a twentieth. `with`
+/// makes an engine of the model with responses; what `rest` holds of them makes no difference.
 ///
 /// # Errors
 /// Those of clips, of sessions and of `with`; [`visavis::ErrorKind::Argument`] for a model that does
@@ -44,16 +47,17 @@ const ROUNDS: usize = 3;
 pub fn calibrate_rest(
     rest: &RestConfig,
     clips: &[Clip],
+    windows: usize,
     with: &dyn Fn(&RestConfig) -> Result<Arc<Engine>>,
     threads: usize,
     progress: &(dyn Fn(EvalProgress<'_>) + Sync),
 ) -> Result<RestConfig> {
     let mut rest = RestConfig { reference: None, student: None, ..rest.clone() };
     let engine = with(&rest)?;
-    let listeners = Listeners::of(&engine, clips)?;
     let response = |name: &str, sampler: Sampler| -> Result<RestResponse> {
         let told = |i| progress(EvalProgress { stage: &format!("{name}, activity"), done: i, total: STIRRING.len() });
-        let curves = curves(&engine, &rest.levels, sampler, threads, &told)?;
+        let sessions = ((windows / 4).max(1), SHORT);
+        let curves = curves(&engine, &rest.levels, sampler, (threads, sessions), &told)?;
         let [stirring, hands, head] = curves.each_ref().map(|points| ascending(points, name));
         let (none, seconds) = ([0.0; ACTIVITY], rest.seconds);
         Ok(RestResponse { curves: [stirring?, hands?, head?], alone: none, listening: none, seconds })
@@ -61,33 +65,62 @@ pub fn calibrate_rest(
     let reference = Some(response("reference", SessionOptions::default().sampler)?);
     let student = engine.config().student.map(|_| response("student", Sampler::Single)).transpose()?;
     (rest.reference, rest.student) = (reference, student);
-    let (wanted, people) = (mean(&rest.levels), Real::read()?.idle.rest_changes);
+    let wanted = Wanted {
+        idle: mean(&rest.levels),
+        changes: Real::read()?.idle.rest_changes,
+        listeners: Listeners::of(&engine, clips, 5 * windows)?,
+    };
     for i in 0..ROUNDS {
         progress(EvalProgress { stage: "sessions at rest", done: i + 1, total: ROUNDS });
         let engine = with(&rest)?;
+        let sessions = ((windows / 2).max(1), LONG);
         let samplers = [SessionOptions::default().sampler, Sampler::Single];
         for (response, sampler) in [&mut rest.reference, &mut rest.student].into_iter().zip(samplers) {
-            let Some(response) = response else { continue };
-            let options = SessionOptions { sampler, ..Default::default() };
-            let idle = |seen| Idle::of_sessions(&engine, &options, seen, threads, LONG);
-            let missing = |done: &Liveliness| less(wanted, measured(done));
-            let (seen, alone) = (idle(true)?.figures, idle(false)?.figures);
-            let silent = missing(&seen);
-            for (curve, missing) in response.curves.iter_mut().zip(silent) {
-                curve.0.iter_mut().for_each(|[done, _]| *done -= missing);
-            }
-            // The curves have moved for these too.
-            response.alone = plus(response.alone, less(missing(&alone), silent));
-            if let (Some(seen), Some(alone), Some(people)) = (seen.rest_changes, alone.rest_changes, people) {
-                let longer = (0.5 * (seen + alone) / people).clamp(1.0 / LONGER, LONGER);
-                response.seconds = (response.seconds * longer as f32).clamp(HELD[0], HELD[1]);
-            }
-            if let Some(missing) = listeners.missing(&engine, &options, threads)? {
-                response.listening = plus(response.listening, less(missing, silent));
+            if let Some(response) = response {
+                let options = SessionOptions { sampler, ..Default::default() };
+                wanted.approach(response, &engine, &options, (threads, sessions))?;
             }
         }
     }
     Ok(rest)
+}
+
+/// What sessions are to do.
+struct Wanted {
+    /// Activity of people at rest.
+    idle: [f32; ACTIVITY],
+    /// Changes of their hands' rest place a minute.
+    changes: Option<f64>,
+    /// Agents who listen.
+    listeners: Listeners,
+}
+
+impl Wanted {
+    /// Shifts what is asked for by what sessions of `engine`, which has this response, lack.
+    fn approach(
+        &self,
+        response: &mut RestResponse,
+        engine: &Arc<Engine>,
+        options: &SessionOptions,
+        (threads, sessions): (usize, (usize, usize)),
+    ) -> Result<()> {
+        let idle = |seen| Idle::of_sessions(engine, options, seen, threads, sessions);
+        let (seen, alone) = (idle(true)?.figures, idle(false)?.figures);
+        let silent = less(self.idle, measured(&seen));
+        for (curve, missing) in response.curves.iter_mut().zip(silent) {
+            curve.0.iter_mut().for_each(|[done, _]| *done -= missing);
+        }
+        // The curves have moved for the others too.
+        response.alone = grown(response.alone, less(less(self.idle, measured(&alone)), silent));
+        if let Some(missing) = self.listeners.missing(engine, options, threads)? {
+            response.listening = grown(response.listening, less(missing, silent));
+        }
+        if let (Some(seen), Some(alone), Some(people)) = (seen.rest_changes, alone.rest_changes, self.changes) {
+            let longer = (0.5 * (seen + alone) / people).clamp(1.0 / LONGER, LONGER);
+            response.seconds = (response.seconds * longer as f32).clamp(HELD[0], HELD[1]);
+        }
+        Ok(())
+    }
 }
 
 /// What a body before a silent user does as it is told: points (done, told) of each value, ascending
@@ -96,7 +129,7 @@ fn curves(
     engine: &Arc<Engine>,
     levels: &[[f32; ACTIVITY]],
     sampler: Sampler,
-    threads: usize,
+    (threads, sessions): (usize, (usize, usize)),
     progress: &dyn Fn(usize),
 ) -> Result<[Vec<[f32; 2]>; ACTIVITY]> {
     let mut points = [const { Vec::new() }; ACTIVITY];
@@ -105,7 +138,7 @@ fn curves(
         let told = along(levels, stirring);
         let diagnostics = Diagnostics { activity: Some(told), ..Default::default() };
         let options = SessionOptions { sampler, diagnostics, ..Default::default() };
-        let done = measured(&Idle::of_sessions(engine, &options, true, threads, SESSIONS)?.figures);
+        let done = measured(&Idle::of_sessions(engine, &options, true, threads, sessions)?.figures);
         (0..ACTIVITY).for_each(|k| points[k].push([done[k], told[k]]));
     }
     for points in &mut points {
@@ -122,9 +155,9 @@ struct Listeners {
 }
 
 impl Listeners {
-    fn of(engine: &Engine, clips: &[Clip]) -> Result<Self> {
+    fn of(engine: &Engine, clips: &[Clip], most: usize) -> Result<Self> {
         let rig = &engine.config().rig;
-        let windows = Window::choose(clips, WINDOWS)?.into_iter().filter_map(|window| {
+        let windows = Window::choose(clips, most)?.into_iter().filter_map(|window| {
             let mask = people::listening(&window.segment).split_off(LEAD);
             mask.contains(&true).then_some((window, mask))
         });
@@ -155,8 +188,9 @@ impl Listeners {
     }
 }
 
-fn plus(a: [f32; ACTIVITY], b: [f32; ACTIVITY]) -> [f32; ACTIVITY] {
-    std::array::from_fn(|i| a[i] + b[i])
+/// An offset and what is missing yet, no more than [`MOST`].
+fn grown(offset: [f32; ACTIVITY], missing: [f32; ACTIVITY]) -> [f32; ACTIVITY] {
+    std::array::from_fn(|i| (offset[i] + missing[i]).clamp(-MOST, MOST))
 }
 
 fn less(a: [f32; ACTIVITY], b: [f32; ACTIVITY]) -> [f32; ACTIVITY] {

@@ -4,7 +4,7 @@ use super::*;
 use crate::offline::Conversation;
 use crate::offline::UserPath;
 use glam::Vec3;
-use visavis::internals::config::Config;
+use visavis::internals::config::{Config, RestConfig};
 
 /// Half a minute of two voices that take turns, and a user who goes round the agent.
 pub(super) fn talk() -> Conversation {
@@ -210,4 +210,33 @@ fn calibration_measures_the_channel() {
         (Err(a), Err(b)) => assert!(a.to_string().contains("does not follow") && a.to_string() == b.to_string(), "{a}"),
         (a, b) => panic!("one outcome: {a:?}, {b:?}"),
     }
+}
+
+/// The shipped model, whose responses are forgotten, finds some again with which it rests as people
+/// do, as far as two minutes can tell.
+#[test]
+#[ignore = "takes a minute; .ci/full runs it"]
+fn calibration_of_rest_brings_sessions_near_people() {
+    let file = visavis::BundleFile::open(concat!(env!("CARGO_MANIFEST_DIR"), "/../models/visavis-room-i8.safetensors"));
+    let file = file.unwrap();
+    let settings = file.parse().unwrap().0;
+    let with = |rest: &RestConfig| {
+        let settings = Config { rest: Some(rest.clone()), ..settings.clone() };
+        Engine::from_bytes(file.with_settings(&settings)?, "calibrated")
+    };
+    let rest = settings.rest.as_ref().unwrap();
+    let clips = synthetic(&settings.rig, &talk());
+    let found = calibrate_rest(rest, &clips, 1, &with, 2, &|_| {}).unwrap();
+    let responses: Vec<_> = found.responses().collect();
+    assert_eq!(responses.len(), 2, "both networks");
+    for (network, response) in responses {
+        let shipped = rest.responses().find(|(name, _)| *name == network).unwrap().1;
+        for (own, shipped) in response.curves.iter().zip(&shipped.curves) {
+            let (own, shipped) = (own.channel(0.0), shipped.channel(0.0));
+            assert!((own - shipped).abs() < 0.8, "{network}: {own}, {shipped}");
+        }
+        assert!(response.alone.iter().chain(&response.listening).all(|more| more.abs() <= 2.0), "{response:?}");
+        assert!((5.0..=40.0).contains(&response.seconds), "{network}: {} s", response.seconds);
+    }
+    assert!(with(&found).is_ok(), "they can be stored");
 }
