@@ -212,7 +212,6 @@ def figures(run, chosen, judge):
     at = torch.arange(len(chosen))
     told = judge(moved(positions, roots, places, onset)).argmax(-1)
     right = told == torch.tensor([REACTIONS.index(r) for r in wanted])
-    wrap = lambda a: torch.remainder(a + np.pi, 2 * np.pi) - np.pi
 
     def bearing(t):
         d = places[:, [0, 2]] - roots[at, t, :2]
@@ -221,11 +220,11 @@ def figures(run, chosen, judge):
     t15 = onset + 45
     hips = roots[..., 2]
     turns = torch.tensor([r in TURNS for r in wanted])
-    body, eyes = wrap(bearing(t15) - hips[at, t15]).abs() * 57.3, wrap(bearing(t15) - head[at, t15]).abs() * 57.3
-    first = wrap(bearing(onset) - hips[at, onset])
-    turned = wrap(hips[at, t15] - hips[at, onset])
+    body, eyes = rig.wrap(bearing(t15) - hips[at, t15]).abs() * 57.3, rig.wrap(bearing(t15) - head[at, t15]).abs() * 57.3
+    first = rig.wrap(bearing(onset) - hips[at, onset])
+    turned = rig.wrap(hips[at, t15] - hips[at, onset])
     aside = turns & (first.abs() > 0.5) & (first.abs() < 2.64) & (turned.abs() > 0.26)
-    speed = wrap(head.diff(dim=1)).abs() * 30
+    speed = rig.wrap(head.diff(dim=1)).abs() * 30
     wrists = [rig.INDEX["leftHand"], rig.INDEX["rightHand"]]
     local = positions - positions[:, :, :1]
     hands = local[:, :, wrists].diff(dim=1).norm(dim=-1).amax(-1) * 30
