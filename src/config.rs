@@ -385,12 +385,10 @@ pub enum Company {
 pub struct RestResponse {
     /// Value by value, before a user who is silent.
     pub curves: [ResponseCurve; ACTIVITY],
-    /// Added to what is wanted where nobody is seen: told the same, a body is not as active there.
-    #[serde(default)]
+    /// Added to what is wanted where nobody is seen: told the same, a body is more active there.
     pub alone: [f32; ACTIVITY],
     /// Added to what is wanted while the user speaks: what a listener has more of than people who
     /// wait, less what the network does of itself.
-    #[serde(default)]
     pub listening: [f32; ACTIVITY],
     /// For how long it is told the same on average, seconds: bodies also move because they are told
     /// something new.

@@ -181,9 +181,7 @@ impl Listeners {
             tally.add(&engine.config().rig, &motion::in_window(engine, &options, window)?, mask);
             Ok(tally)
         })?;
-        let mut all = Tally::default();
-        tallies.into_iter().for_each(|tally| all.merge(tally));
-        let done = all.row();
+        let done = Tally::sum(tallies).row();
         Ok((done.seconds > 0.0).then(|| less(measured(&self.done), measured(&done))))
     }
 }

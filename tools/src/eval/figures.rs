@@ -194,10 +194,7 @@ fn pooled(windows: &[&Measured], moments: &dyn Fn(&Measured) -> &Moments) -> Mom
 }
 
 fn tally(motion: &[Measured], part: impl Fn(&Measured) -> &Tally) -> Tally {
-    motion.iter().fold(Tally::default(), |mut all, m| {
-        all.merge(part(m).clone());
-        all
-    })
+    Tally::sum(motion.iter().map(|m| part(m).clone()))
 }
 
 fn nods(motion: &[Measured]) -> NodTally {

@@ -110,10 +110,8 @@ impl Idle {
             tally.add(&motion.rig, frames, &vec![true; frames.len()]);
             Ok(tally)
         })?;
-        let mut all = Tally::default();
-        tallies.into_iter().for_each(|tally| all.merge(tally));
         let name = made_with(engine, options.sampler);
-        Ok(Self { name: if seen { name } else { alone(&name) }, figures: all.row() })
+        Ok(Self { name: if seen { name } else { alone(&name) }, figures: Tally::sum(tallies).row() })
     }
 }
 

@@ -151,6 +151,13 @@ impl Tally {
         }
     }
 
+    /// All of `tallies` together.
+    pub fn sum(tallies: impl IntoIterator<Item = Self>) -> Self {
+        let mut all = Self::default();
+        tallies.into_iter().for_each(|tally| all.merge(tally));
+        all
+    }
+
     /// The measures.
     pub fn row(&self) -> Liveliness {
         let share = |sum: f64, n: usize| (n > 0).then(|| sum / n as f64);
